@@ -92,14 +92,13 @@ def plan_and_note(config: str) -> None:
     """Plan a study, write its tasks and note what later steps are called with."""
     from springtune.studies.kinds import load_study
     from springtune.studies.runs import rerun
-    from springtune.studies.runs.plan import plan
 
     loaded = load_study(config)
-    made = plan(loaded, Path("results") / loaded.name, 2)
-    made.write()
-    jobs = rerun.jobs(loaded, made)
+    jobs = rerun.jobs(loaded, Path("results") / loaded.name)
+    for job in jobs.values():
+        job.write()
     found = {"scenes": len(loaded.scenes), "jobs": len(jobs), "digest": jobs[rerun.COLLECT].digest}
-    found["stages"] = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}
+    found["stages"] = {name: [job.stage.name, job.digest] for name, job in jobs.items() if job.stage}
     Path("plan.json").write_text(json.dumps(found))
 
 
@@ -119,7 +118,7 @@ def do_stages(config: str, invent: str) -> None:
                 write_invented(Path(note["content"]["folder"]) / f"{family['name']}.h5", family["tasks"])
             atomic.write_json(done, {"digest": digest, "computed": len(note["content"]["files"])})
         else:
-            job.main(str(tasks), str(done), digest)
+            job.main(str(tasks), str(done), digest, config)
         spent += sum(os.times()[:4]) - begin if stage == "solve" else 0.0
     Path("solve.json").write_text(json.dumps(spent))
 

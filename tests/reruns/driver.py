@@ -14,7 +14,7 @@ import xarray as xr
 sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
 
 from springtune.mesh import MESH_TYPES
-from springtune.studies.runs import job, rerun
+from springtune.studies.runs import attempts, rerun
 
 from campaigns import Campaign
 
@@ -35,8 +35,8 @@ TIMES = re.compile("seconds|created|history|git_")
 class Run(Campaign):
     """The study of this folder, as it is to be run now."""
 
-    def __init__(self, cores=1):
-        super().__init__(CONFIG, cores)
+    def __init__(self):
+        super().__init__(CONFIG)
 
     def finish(self):
         """Run what is to run.
@@ -50,7 +50,7 @@ class Run(Campaign):
         """
         names, solved = self.due(), {}
         if names:
-            self.plan.write()
+            self.write()
         for name in names:
             self.do(name)
             computed = json.loads(self.jobs[name].record.read_text()).get("computed", 0)
@@ -60,11 +60,11 @@ class Run(Campaign):
 
     def called(self, name):
         """Name of a job, without the number of its bundle."""
-        return self.plan.jobs[name].stage.name if name in self.plan.jobs else name
+        return self.bundles[name].stage.name if name in self.bundles else name
 
     def do_stage(self, name):
         """A job of a stage, in this process, which compiles once what it needs."""
-        note = json.loads(self.plan.tasks(name).read_text())
+        note = json.loads(self.bundles[name].tasks.read_text())
         computed = attempts.do(note["module"], note["content"])
         self.jobs[name].record.parent.mkdir(parents=True, exist_ok=True)
         self.jobs[name].record.write_text(json.dumps({"digest": note["digest"], "computed": computed}))

@@ -44,14 +44,11 @@ class Row:
         Names of the jobs that run then, and no others.
     solved : dict
         Results that are computed then, by stage, and no others.
-    cores : int
-        Cores of the run.
     """
 
     change: object
     jobs: set
     solved: dict
-    cores: int = 1
 
     @property
     def computes(self):
@@ -59,13 +56,13 @@ class Row:
         return getattr(self.change, "func", None) is replace_twice
 
 
-def row(change, jobs="", solved=None, cores=1):
+def row(change, jobs="", solved=None):
     """Row of the table, its capitals written out."""
     counts = {}
     for name, count in (solved or {}).items():
         for kind, one in (RESULTS.get(name) or {name: count}).items():
             counts[STAGES.get(kind, kind)] = counts.get(STAGES.get(kind, kind), 0) + one
-    return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts, cores)
+    return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts)
 
 
 def replace(*pairs):

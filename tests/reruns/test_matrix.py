@@ -83,14 +83,14 @@ def fresh(tmp_path_factory, complete):
 
 @pytest.mark.parametrize("planned", STUDY, indirect=True)
 def test_exactly_these_jobs_are_to_run(planned):
-    run = driver.Run(planned.cores)
+    run = driver.Run()
     assert {run.called(name) for name in run.due()} == planned.jobs
 
 
 @pytest.mark.parametrize("changed", STORED, indirect=True)
 def test_springtune_run_makes_missing_what_snakemake_cannot_see(changed):
     """Snakemake runs jobs whose record is missing or was of another digest, and those that come after them."""
-    run = driver.Run(changed.cores)
+    run = driver.Run()
     due = run.due()
     for record in rerun.outdated(run.study, run.folder) or ():
         record.unlink()
@@ -116,10 +116,10 @@ def test_a_dataset_has_the_files_that_are_there(changed):
 @pytest.mark.slow
 @pytest.mark.parametrize("changed", ROWS, indirect=True)
 def test_exactly_these_results_are_computed_and_the_dataset_is_that_of_a_fresh_run(changed, fresh):
-    jobs, solved = driver.Run(changed.cores).finish()
+    jobs, solved = driver.Run().finish()
     assert solved == changed.solved
     assert driver.dataset(Path()) == fresh()
-    assert driver.Run(changed.cores).due() == []
+    assert driver.Run().due() == []
 
 
 # -- code --------------------------------------------------------------------------------------------------------------

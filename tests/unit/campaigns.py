@@ -9,7 +9,7 @@ from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
-from springtune.studies.runs import job, rerun
+from springtune.studies.runs import attempts, job, rerun
 from springtune.studies.runs.plan import plan
 
 
@@ -36,28 +36,28 @@ def do_stages(study, folder, *stages):
 class Campaign:
     """A study of this folder, as it is to be run now."""
 
-    def __init__(self, config, cores=1):
+    def __init__(self, config):
         for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
             cache.cache_clear()
         self.config, self.study = str(config), load_study(config)
         self.folder = Path("results") / self.study.name
-        self.plan = plan(self.study, self.folder, cores)
-        self.jobs = rerun.jobs(self.study, self.plan)
+        self.jobs = rerun.jobs(self.study, self.folder)
+        self.bundles = {name: job for name, job in self.jobs.items() if job.stage}
 
     def due(self):
         """Names of the jobs that are to run, in order."""
         found = []
         for name, one in self.jobs.items():
-            if rerun.fault(one, self.jobs) or self.before(name) & set(found):
+            if rerun.fault(one) or self.before(name) & set(found):
                 found.append(name)
         return found
 
     def before(self, name):
         """Jobs that a job comes after."""
-        if name not in self.plan.jobs:
-            return {*self.plan.jobs} if name == rerun.COLLECT else {rerun.COLLECT}
-        stage, label = self.plan.jobs[name].stage, self.plan.jobs[name].label
-        others = self.plan.jobs.items()
+        if name not in self.bundles:
+            return {*self.bundles} if name == rerun.COLLECT else {rerun.COLLECT}
+        stage, label = self.bundles[name].stage, self.bundles[name].label
+        others = self.bundles.items()
         same = {other for other, job in others if job.stage.name == stage.like and job.label == label}
         return same | {other for other, job in others if job.stage.name in stage.every}
 
@@ -73,7 +73,7 @@ class Campaign:
         if last is not None:
             names = names[: names.index(last) + 1] if last in names else []
         if names:
-            self.plan.write()
+            self.write()
         for name in names:
             self.do(name)
         return names
@@ -86,7 +86,7 @@ class Campaign:
     def do(self, name):
         """A job, by the function that its rule calls."""
         one, dataset = self.jobs[name], str(self.folder / rerun.DATASET)
-        if name in self.plan.jobs:
+        if name in self.bundles:
             self.do_stage(name)
         elif name == rerun.COLLECT:
             collect.main(self.config, str(self.folder), dataset, str(one.record), one.digest)
@@ -98,4 +98,10 @@ class Campaign:
 
     def do_stage(self, name):
         """A job of a stage."""
-        job.main(str(self.plan.tasks(name)), str(self.jobs[name].record), self.jobs[name].digest)
+        one = self.jobs[name]
+        job.main(str(one.tasks), str(one.record), one.digest, self.config)
+
+    def write(self):
+        """Write the tasks of all jobs, as the begin of a run does."""
+        for one in self.bundles.values():
+            one.write()

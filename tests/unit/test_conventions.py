@@ -9,9 +9,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from springtune.registry import imported
-from springtune.studies.config.kind import kinds
-
 REPOSITORY = Path(__file__).parents[2]
 SOURCE = REPOSITORY / "src/springtune"
 PARSED = {path: ast.parse(path.read_bytes()) for path in sorted(SOURCE.rglob("*.py"))}
@@ -87,15 +84,6 @@ def test_tests_use_what_everybody_may_use(path):
                 (node.lineno, f"{root(target)}.{target.attr} = ...") for target in targets if root(target) in names
             ]
     assert not found, "\n".join(f"{path.relative_to(REPOSITORY)}:{line}: {what}" for line, what in found)
-
-
-@pytest.mark.parametrize("stage", [one for kind in kinds() for one in kind.stages], ids=lambda one: one.name)
-def test_stages_store_what_a_crash_loses(stage):
-    """The job does for those whose tasks it knows; of others with a loop of their own calibrate loses none."""
-    module = imported(stage.module)
-    own = hasattr(module, "run") and not hasattr(module, "tasks")
-    assert own or callable(module.solve)
-    assert hasattr(module, "crashed") == (own and stage.name != "calibrate")
 
 
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}

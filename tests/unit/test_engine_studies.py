@@ -115,7 +115,7 @@ def ends(data):
 def stages_due():
     """Jobs of stages that are to run."""
     campaign = Campaign("try.yaml")
-    return [name for name in campaign.due() if name in campaign.plan.jobs]
+    return [name for name in campaign.due() if name in campaign.bundles]
 
 
 # -- what is asked for -------------------------------------------------------------------------------------------------

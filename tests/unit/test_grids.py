@@ -396,18 +396,6 @@ def test_what_goes_with_the_mesh_size_is_shown_on_its_own_meshes(here):
         assert "mesh 5 to 10\u00a0mm" in panel.get_title(loc="left").replace("\n", " ")
 
 
-def test_a_reference_whose_process_died_is_lost_in_its_own_file(tmp_path):
-    from springtune.studies.kinds.scenes import reference
-    from springtune.studies.runs import store
-
-    interpolant = {"key": "i", "box": [], "problems": {"a": (3.0, 0.3), "b": (3.0, 0.2)}}
-    files = [{"name": "a", "tasks": [{"key": "a"}]}, {"name": "i", "tasks": [interpolant]}]
-    tasks = {"folder": str(tmp_path), "files": files}
-    for key, file in (("a", "a"), ("b", "i"), ("i", "i")):
-        reference.crashed(tasks, key, "the process died")
-        assert key in store.stored(tmp_path / f"{file}.h5")
-
-
 def test_fields_of_a_sweep_say_of_which_values_they_are(here):
     grid = {"load": ["traction", "bending"], "force": ["1 kN", "2 kN"], "thickness": ["1 mm", "2 mm"]}
     grid |= {"mesh_size": "10 mm"}

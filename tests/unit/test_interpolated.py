@@ -16,6 +16,7 @@ from springtune.studies.kinds.scenes.plan import (
     solved_reference,
 )
 from springtune.studies.runs import store
+from springtune.studies.runs.attempts import Attempts
 from springtune.studies.runs.plan import plan
 
 from campaigns import do_stages
@@ -144,5 +145,5 @@ def test_one_whose_process_dies_is_a_hole(load, tmp_path):
     study = load(lengths(MANY))
     (job,) = [job for job in plan(study, tmp_path).values() if job.stage.name == "reference"]
     (task,) = (task for file in job.content["files"] for task in file["tasks"])
-    reference.crashed(job.content, task["key"], "it died")
+    reference.run(job.content, Attempts({task["key"]: "it died"} | dict.fromkeys(task["problems"], "it died")))
     assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "it died"

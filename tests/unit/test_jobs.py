@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -15,6 +16,9 @@ from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
 from springtune.studies.runs.source import STATE, hash_of, source_state
 from springtune.studies.runs.store import DamagedError
+
+from campaigns import Campaign
+from tables import STUDIES
 
 RESULTS = {
     "one": {"displacement": 1.25e-3, "message": "µ", "iterations": 3, "field": np.arange(30.0).reshape(10, 3)},
@@ -113,7 +117,7 @@ def stage(tmp_path, monkeypatch):
     (tmp_path / "tasks/tested_0.json").write_text(json.dumps(note))
 
     def run(digest=note["digest"]):
-        job.main(str(tmp_path / "tasks/tested_0.json"), str(tmp_path / "done/tested_0.json"), digest)
+        job.main(str(tmp_path / "tasks/tested_0.json"), str(tmp_path / "done/tested_0.json"), digest, "study.yaml")
         return json.loads((tmp_path / "done/tested_0.json").read_text())["computed"]
 
     def read():
@@ -179,14 +183,16 @@ def test_a_damaged_file_ends_the_job_with_its_remedy_and_is_made_again(stage):
     assert run() == 2
 
 
-def test_a_note_of_something_else_is_not_done(stage):
-    acts, run, read, folder = stage
-    with pytest.raises(SystemExit, match="not what this job is to do"):
-        run("other")
-    path = folder / "tasks/tested_0.json"
-    path.write_text(path.read_text().replace("a1", "a3"))
-    with pytest.raises(SystemExit, match="not what this job is to do"):
-        run()
+def test_a_job_that_no_run_has_noted_plans_its_study(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("small.yaml").write_text(STUDIES["survival"])
+    campaign = Campaign("small.yaml")
+    campaign.do("mesh_0")
+    assert campaign.jobs["mesh_0"].record.exists() and campaign.jobs["solve_0"].tasks.exists()
+    Path("small.yaml").write_text(STUDIES["survival"].replace("5 mm", "6 mm"))
+    campaign.jobs["mesh_0"].tasks.unlink()
+    with pytest.raises(SystemExit, match="small.yaml was changed while it ran; call the same command again"):
+        campaign.do("mesh_0")
 
 
 def test_an_edit_of_the_program_during_a_run_ends_its_jobs(stage, monkeypatch):

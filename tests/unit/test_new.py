@@ -40,7 +40,7 @@ def checkout(tmp_path, monkeypatch):
 def ran(config, group="/"):
     """Run all jobs of a study, look for what they make, and return its scenes, which are solved."""
     campaign = Campaign(config)
-    campaign.plan.write()
+    campaign.write()
     for name in campaign.jobs:
         campaign.do(name)
     for product in ("figures", "tables/index.html", "index.html"):

@@ -18,7 +18,6 @@ from springtune.reference.answers import unit_scales
 from springtune.reference.small_strain import solve_unit
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
-from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.samples import designs, interpolate, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
@@ -26,6 +25,7 @@ from springtune.studies.kinds.samples.figures import plot_sobol
 from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
 from springtune.studies.runs.attempts import Attempts
+from springtune.studies.runs.plan import plan
 
 import tables
 from campaigns import Campaign, load_text
@@ -56,10 +56,10 @@ def run(*replaced, name="sample", outputs="tables"):
     """Jobs of a study up to its dataset, in this process."""
     Path(f"{name}.yaml").write_text(study_text(*replaced, outputs=outputs))
     campaign = Campaign(f"{name}.yaml")
-    campaign.plan.write()
+    campaign.write()
     shutil.copytree("references", campaign.folder / "samples", dirs_exist_ok=True)
     for job in campaign.jobs:
-        if job in campaign.plan.jobs or job == "collect":
+        if job in campaign.bundles or job == "collect":
             campaign.do(job)
     for path in campaign.jobs["interpolate_0"].products:
         shutil.copy(path, "references")
@@ -374,8 +374,7 @@ class TestFailures:
         study = load_text(tmp_path, study_text(("size: 16", "size: 8")))
         content, file = content_of("sample", study, tmp_path)
         block = file["name"]
-        solve.crashed(content, f"{block} 0 {file['meshed']}", "its process died")
-        solve.run(content, Attempts())
+        solve.run(content, Attempts({f"{block} 0 {file['meshed']}": "its process died"}))
         keys = list(file["results"])
         found = store.read(tmp_path / "samples" / f"{block}.h5", keys, ("status",))
         for key in keys:
@@ -383,16 +382,14 @@ class TestFailures:
             assert (found[key]["status"][1:2] == Status.SOLVED).all()
 
     def test_what_was_lost_of_one_mesh_type_is_tried_of_another(self, tmp_path):
-        """Names of lost networks say all that these depend on, the code among it."""
+        """Names of networks say all that these depend on, the code among it."""
         names = []
         for mesh_type in ("structured", "right"):
             how = ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {mesh_type}")
             spent = Noting()
-            content, results = networks(tmp_path, how, spent=spent)
+            _, results = networks(tmp_path, how, spent=spent)
             assert [found["messages"] for found in results] == [{}] * len(results)
-            names.append(set(spent.names))  # as if each network had been lost
-            for name in names[-1]:
-                solve.crashed(content, name, "its process died")
+            names.append(set(spent.names))
         assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
 
     def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
@@ -404,7 +401,7 @@ class TestFailures:
             ("height: {from: 20 mm, to: 40 mm}", "height: 40 mm"),
             (RATIOS, "0"),
         )
-        spent = Attempts()
+        spent = Attempts({})
         _, results = networks(tmp_path, *how, spent=spent)
         assert not spent.broken
         status = results[0]["status"]
@@ -422,7 +419,7 @@ class TestReferences:
         """Store what a build that is not certified stores; the task and the file."""
         study = load_text(folder, study_text(*replaced))
         content, _ = content_of("interpolate", study, folder / "samples_of")
-        (path,) = products(content)
+        path = file_of(content)
         store.add(path, {path.stem: {"message": "no interpolant", "seconds": 0.0, "asked": 0}})
         return content, path
 
@@ -463,17 +460,18 @@ class TestReferences:
         spent = Noting()
         interpolate.run(content, spent)
         assert len(spent.names) == 8
-        before = store.read(path, store.stored(path))
-        interpolate.crashed(content, spent.names[3], "its process died")
+        path.unlink()
+        content, path = self.without(tmp_path, self.PLAIN)
+        interpolate.run(content, Attempts({spent.names[3]: "its process died"}))
         after = store.read(path, store.stored(path))
-        assert [key for key in after if after[key] != before[key]] == [spent.names[3]]
+        assert [key for key in after if after[key]["message"] == "its process died"] == [spent.names[3]]
 
 
 class Noting(Attempts):
     """Notes the names of its tasks."""
 
     def __init__(self):
-        super().__init__()
+        super().__init__({})
         self.names = []
 
     def attempt(self, key, function, failed):
@@ -486,17 +484,22 @@ def networks(folder, *replaced, spent=None):
     folder.mkdir(exist_ok=True)
     study = load_text(folder, study_text(*replaced))
     content, file = content_of("sample", study, folder)
-    solve.run(content, spent or Attempts())
+    solve.run(content, spent or Attempts({}))
     fields = ("displacement", "status", "particles")
-    found = [store.read(path, [*file["results"]], fields) for path in products(content)]
+    found = [store.read(path, [*file["results"]], fields) for path in [file_of(content)]]
     return content, [block[key] for block in found for key in file["results"]]
 
 
 def content_of(name, study, folder):
     """Content of a job with all tasks of a stage of samples, and its first file."""
-    stage = next(one for kind in kinds() for one in kind.stages if one.name == name)
-    content = stage.content(study, folder, [[task] for task in stage.tasks(study)])
+    (content,) = (job.content for job in plan(study, folder).values() if job.stage.name == name)
     return content, content["files"][0]
+
+
+def file_of(content):
+    """The only file that a job makes."""
+    (file,) = content["files"]
+    return Path(content["folder"]) / f"{file['name']}.h5"
 
 
 class TestRefusals:
@@ -512,7 +515,7 @@ class TestRefusals:
             definition = ("definition: lattice\n  p", "definition: stiffening\n  p")
             study = load_text(here, study_text(("size: 16", "size: 8"), definition, (MODULI, "1 MPa")))
             content, file = content_of("sample", study, here)
-            solve.run(content, Attempts())
+            solve.run(content, Attempts({}))
             key = next(key for key, scene in file["results"].items() if scene["definition"] == "stiffening")
             path = here / "samples" / f"{file['name']}.h5"
             found = store.read(path, [key], ("status",))[key]

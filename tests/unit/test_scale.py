@@ -15,7 +15,6 @@ from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
 from springtune.studies.output import page
 from springtune.studies.runs import rerun, store
-from springtune.studies.runs.plan import plan
 
 from campaigns import do_stages, load_text
 
@@ -62,8 +61,7 @@ def study_of(tool, tmp_path, monkeypatch):
 
 def planned(config):
     study = load_study(config)
-    made = plan(study, Path("results") / study.name, 1)
-    return study, made, rerun.jobs(study, made)
+    return study, rerun.jobs(study, Path("results") / study.name)
 
 
 def calls(function):
@@ -94,14 +92,15 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
     opened = {}
     for forces in (2, 6):
         config = study_of(forces)
-        study, made, _ = planned(config)
-        made.write()
-        noted = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}
+        study, jobs = planned(config)
+        for job in jobs.values():
+            job.write()
+        noted = {name: [job.stage.name, job.digest] for name, job in jobs.items() if job.stage}
         Path("plan.json").write_text(json.dumps({"stages": noted}))
         tool.do_stages(config, "invent")
         with counted(scenes.hash_of, store.read) as count:
             study = planned(config)[0]
-            groups = collect.gathered(study, made.folder)
+            groups = collect.gathered(study, jobs["collect"].folder)
         # One a scene; there are half as many curves, which are hashed twice, and some references.
         assert len(study.scenes) == 16 * forces and count["hash_of"] < 3 * len(study.scenes)
         assert int((groups["/"].status == 1).sum()) == len(study.scenes)

@@ -10,7 +10,7 @@ from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
 from springtune.studies.kinds.stability import solve as stability
 from springtune.studies.kinds.stability.kind import KIND
 from springtune.studies.output.dataset import DIMENSIONS
-from springtune.studies.runs import attempts, job, store
+from springtune.studies.runs import attempts, store
 from springtune.studies.runs import keys as code
 
 from tables import STUDIES

@@ -13,14 +13,13 @@ import xarray as xr
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLogHandlerBase
 
-from snakemake_logger_plugin_springtune import LogHandler
-from snakemake_logger_plugin_springtune.display import Display
+from snakemake_logger_plugin_springtune import Display, LogHandler
 from springtune.problem.status import Status
 from springtune.safe_io import atomic
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary, summing_up
-from springtune.studies.runs import plan, rerun, workload
+from springtune.studies.runs import rerun
 
 from tables import STUDIES
 
@@ -135,23 +134,23 @@ def planned(tmp_path):
     """A study, its plan, and the names of its jobs."""
     (tmp_path / "two.yaml").write_text(STUDY)
     study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
-    made = plan.plan(study, folder, 2)
-    return study, made, list(made.jobs)
+    made = rerun.jobs(study, folder)
+    return study, made, [name for name, job in made.items() if job.stage]
 
 
 def test_outputs_without_files_have_no_job(planned, tmp_path):
     (tmp_path / "none.yaml").write_text(STUDY.replace("[lattice, patch]}", "lattice, sensitivity: false}"))
     study = load_study(tmp_path / "none.yaml")
     assert "sensitivity" in study.outputs
-    found = rerun.jobs(study, plan.plan(study, tmp_path / "results/none", 1))
+    found = rerun.jobs(study, tmp_path / "results/none")
     assert all(job.products for name, job in found.items() if name.startswith(rerun.PRESENT))
     assert not any("sensitivity" in name for name in found if name.startswith(rerun.PRESENT))
 
 
 def mark_done(made, name, computed, moment):
     """Mark a job done at a time."""
-    atomic.write_json(made.record(name), {"digest": made.jobs[name].digest, "computed": computed})
-    os.utime(made.record(name), (moment, moment))
+    atomic.write_json(made[name].record, {"digest": made[name].digest, "computed": computed})
+    os.utime(made[name].record, (moment, moment))
 
 
 class TestEnding:
@@ -160,12 +159,12 @@ class TestEnding:
         study, made, names = planned
         since = time.time() - 100
         for name in names:
-            count = len(workload.results_of(made.jobs[name].content))
+            count = len(made[name].results)
             mark_done(made, name, count, since + (50 if name.startswith(new) else -50))
-        return summary.ending(study, made, since), made.folder, since
+        return summary.ending(study, made, since), made["collect"].folder, since
 
     def test_says_what_is_new_and_where_it_is(self, planned):
-        folder = planned[1].folder
+        folder = planned[1]["collect"].folder
         (folder / "figures").mkdir(parents=True)
         (folder / "dataset.nc").touch()
         (folder / summary.FILE).write_text("Told before\n")
@@ -175,7 +174,7 @@ class TestEnding:
         assert "new      nothing: all results were stored before" in self.finish(planned, "none")[0]
 
     def test_a_summary_older_than_the_results_is_not_shown(self, planned):
-        folder = planned[1].folder
+        folder = planned[1]["collect"].folder
         folder.mkdir(parents=True)
         (folder / summary.FILE).write_text("Told before\n")
         os.utime(folder / summary.FILE, (0, 0))
@@ -183,9 +182,9 @@ class TestEnding:
         assert "Told before" not in text and "The dataset is older than these results." in text
 
     def test_what_broke_is_named(self, planned):
-        (study, made, names), folder = planned, planned[1].folder
+        (study, made, names), folder = planned, planned[1]["collect"].folder
         _, _, since = self.finish(planned, "solve")
-        made.record(names[-1]).unlink()
+        made[names[-1]].record.unlink()
         (folder / "logs").mkdir()
         (folder / "logs" / f"{names[-1]}.log").write_text("why")
         text = summary.broken(study, made, since)
@@ -229,12 +228,12 @@ def record(message, level=logging.INFO, **more):
 
 def emit_run(made, error=""):
     """Records of a run of three jobs, the last of which may fail."""
-    work = {1: ("Meshing", 3), 2: ("Meshing", 3), 3: ("Solving", 4)}
+    rules = {1: "mesh", 2: "mesh", 3: "solve"}
     made.emit(record("Building DAG of jobs..."))
-    made.emit(record("two: 3 jobs", work=work))
-    for number in work:
+    made.emit(record("Job stats:", event=LogEvent.RUN_INFO, stats={"mesh": 2, "solve": 1, "total": 3}))
+    for number, rule in rules.items():
         made.emit(record("Select jobs to execute..."))
-        made.emit(record("Job: message", event=LogEvent.JOB_INFO, jobid=number))
+        made.emit(record("Job: message", event=LogEvent.JOB_INFO, jobid=number, rule_name=rule))
         if error and number == 3:
             made.emit(record(error, logging.ERROR, event=LogEvent.JOB_ERROR, jobid=number))
         else:
@@ -257,13 +256,13 @@ class TestHandler(TestLogHandlerBase):
         return None
 
     @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
-    def test_elsewhere_than_on_terminals_a_run_is_a_line_a_stage(self, monkeypatch, stream):
+    def test_elsewhere_than_on_terminals_a_run_is_a_line_a_rule(self, monkeypatch, stream):
         made = stream()
         emit_run(handler(monkeypatch, made, ci="true"))
         assert made.getvalue().splitlines() == [
-            "two: 3 jobs",
-            "Meshing: done; 2 of 3 jobs, 0 s, about 0 s left",
-            "Solving: done; 3 of 3 jobs, 0 s",
+            "3 jobs",
+            "mesh: done; 2 of 3 jobs, 0 s, about 0 s left",
+            "solve: done; 3 of 3 jobs, 0 s",
             "what became of it",
             "Complete log(s)",
         ]
@@ -272,7 +271,7 @@ class TestHandler(TestLogHandlerBase):
         made = Terminal()
         emit_run(handler(monkeypatch, made))
         head, *moving, end = re.split(r"\r\x1b\[\?7l", made.getvalue())
-        assert head == "two: 3 jobs\n" and all("\n" not in line for line in moving)
+        assert head == "3 jobs\n" and all("\n" not in line for line in moving)
         assert end == "\x1b[K\x1b[?7hwhat became of it\nComplete log(s)\n"
 
     @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
@@ -299,46 +298,38 @@ class TestHandler(TestLogHandlerBase):
         shown.close()
         assert made.getvalue() == "Building DAG of jobs...\nNothing to be done\n"
 
-    def test_a_warning_before_a_run_leaves_it_a_line_a_stage(self, monkeypatch):
+    def test_a_warning_before_a_run_leaves_it_a_line_a_rule(self, monkeypatch):
         made = io.StringIO()
         shown = handler(monkeypatch, made)
         shown.emit(record("take care", logging.WARNING))
         emit_run(shown)
-        assert made.getvalue().startswith("take care\ntwo: 3 jobs\nMeshing: done")
-
-    def test_without_hooks_jobs_are_told_as_ever(self, monkeypatch):
-        made = Terminal()
-        shown = handler(monkeypatch, made)
-        shown.emit(record("Building DAG of jobs..."))
-        shown.emit(record("Job 1: Meshing", event=LogEvent.JOB_INFO, jobid=1))
-        shown.emit(record("Finished", event=LogEvent.JOB_FINISHED, job_id=1))
-        assert made.getvalue().split("\n") == ["Building DAG of jobs...", "", "Job 1: Meshing", "Finished", ""]
+        assert made.getvalue().startswith("take care\n3 jobs\nmesh: done")
 
     def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
         made = io.StringIO()
         shown = handler(monkeypatch, made)
-        shown.emit(record("two", work={1: None}))
-        shown.emit(record("still told", event=LogEvent.JOB_FINISHED, job_id=1))
-        assert "two" in made.getvalue() and "still told" in made.getvalue()
+        shown.emit(record("Job stats:", event=LogEvent.RUN_INFO, stats={"total": 1}))
+        shown.emit(record("still told", event=LogEvent.JOB_FINISHED))
+        assert "still told" in made.getvalue()
 
 
 def test_what_is_left_follows_the_rate_so_far():
     now = [1000.0]
-    display = Display({1: ("a", 30), 2: ("b", 10), 3: ("b", 20)}, io.StringIO(), True, clock=lambda: now[0])
+    display = Display({"a": 1, "b": 2, "total": 3}, io.StringIO(), True, clock=lambda: now[0])
     display.stop()
-    display.follow(LogEvent.JOB_INFO, 1)
+    display.follow(LogEvent.JOB_INFO, 1, "a")
     now[0] += 60
     assert display.line() == "0 of 3 jobs, 1:00 min: a"
-    display.follow(LogEvent.JOB_FINISHED, 1)
-    display.follow(LogEvent.JOB_INFO, 2)
-    assert display.line() == "1 of 3 jobs, 1:00 min, about 1:00 min left: b"
-    display.follow(LogEvent.JOB_ERROR, 2)
-    assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 1:00 min left"
+    display.follow(LogEvent.JOB_FINISHED, 1, "")
+    display.follow(LogEvent.JOB_INFO, 2, "b")
+    assert display.line() == "1 of 3 jobs, 1:00 min, about 2:00 min left: b"
+    display.follow(LogEvent.JOB_ERROR, 2, "")
+    assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 2:00 min left"
 
 
 def test_a_job_without_a_word_on_a_full_disk(planned, monkeypatch):
     study, made, names = planned
-    log = made.folder / f"logs/{names[0]}.log"
+    log = made["collect"].folder / f"logs/{names[0]}.log"
     log.parent.mkdir(parents=True)
     log.touch()
     for room, said in ((5, "it said nothing"), (0, "it could say nothing: the disk is full; make room")):

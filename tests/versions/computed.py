@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from springtune.studies.kinds import collect, load_study
-from springtune.studies.runs import job as jobs
+from springtune.studies.runs import attempts
 from springtune.studies.runs.plan import plan
 
 if __name__ == "__main__":

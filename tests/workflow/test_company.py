@@ -7,7 +7,7 @@ import h5py
 import pytest
 
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import attempts, job, store
+from springtune.studies.runs import attempts, store
 from springtune.studies.runs.plan import plan
 
 from tables import STUDIES
@@ -18,7 +18,7 @@ TIMES = ("seconds",)
 """Ends of the names of what is another one in every run."""
 
 
-def stages(study, folder, cores=1):
+def stages(study, folder):
     """Modules of the jobs of a study and what they are to do, in an order in which they can run."""
     return [(one.stage.module, one.content) for one in plan(study, folder).values()]
 

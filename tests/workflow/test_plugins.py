@@ -77,10 +77,10 @@ def test_a_scene_moves_in_an_engine_of_a_package(run, site):
 JOBS = """
 from pathlib import Path
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import plan, rerun
+from springtune.studies.runs import rerun
 study = load_study("config/even.yaml")
-jobs = rerun.jobs(study, plan.plan(study, Path("results/even"), 1))
-print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.fault(job, jobs)])
+jobs = rerun.jobs(study, Path("results/even"))
+print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.fault(job)])
 """
 
 SPRINGS, METADATA = "springtune_example/springs.py", "springtune_example-1.0.dist-info/METADATA"

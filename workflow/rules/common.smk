@@ -167,8 +167,7 @@ def begin():
             remove_unfinished(folder.parent, below=False)  # of what studies share
             locks.claim(folder, one.path)
             for job in jobs.values():
-                if job.stage:
-                    job.write()
+                job.write()
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:

@@ -102,9 +102,8 @@ class Job:
         return {(file["name"], task["key"]) for file in self.content["files"] for task in file["tasks"]}
 
     def write(self) -> None:
-        """Write the note that the job reads; an unchanged one stays."""
-        if read_note(self.tasks).get("digest") != self.digest:
-            assert self.stage
+        """Write the note that a job of a stage reads; an unchanged one stays."""
+        if self.stage and read_note(self.tasks).get("digest") != self.digest:
             note = {"digest": self.digest, "module": self.stage.module, "products": self.products}
             atomic.write_bytes(self.tasks, json.dumps(note | {"content": self.content}).encode())
 
