@@ -78,7 +78,7 @@ def test_hooks_of_another_workflow(others, calls):
     [
         (
             {"further": "    prefix: 'there'\n"},
-            "module of springtune: results are in results/<study> and take no other",
+            "module of springtune: results are in results/<study> and take no",
         ),
         ({"config": "{'study': 3}"}, "study: 3 is no path; give that of a study's YAML file"),
         ({"config": "{'study': 'none.yaml'}"}, "none.yaml: cannot be read: No such file or directory"),

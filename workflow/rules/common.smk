@@ -44,7 +44,7 @@ for variable, value in {
 }.items():
     os.environ.setdefault(variable, value)
 # Jobs run on the Python that runs Snakemake, whether its environment is activated or not.
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])
+os.environ |= {"PATH": os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])}
 
 
 # The study.

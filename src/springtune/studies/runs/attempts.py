@@ -51,7 +51,7 @@ Result = dict[str, Any]
 
 
 class RefusedError(Exception):
-    """Tasks cannot be prepared."""
+    """Tasks cannot be prepared, mostly for want of their mesh."""
 
 
 def in_worker(name: str, content: dict[str, Any]) -> int:

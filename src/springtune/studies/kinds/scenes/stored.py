@@ -76,7 +76,7 @@ def prepared(content: dict[str, Any], family: dict[str, Any]) -> GroupedMesh:
     folder = Path(content["results"]) / "meshes"
     if found := read(folder, family["name"]):
         return found
-    raise RefusedError(read_notes(folder, family["name"])["message"])
+    raise RefusedError(read_notes(folder, family["name"])["message"].removeprefix("mesh: "))
 
 
 def read(folder: str | Path, name: str) -> GroupedMesh | None:
