@@ -64,7 +64,7 @@ def test_a_bad_mesh_file_costs_its_own_scenes_alone(run):
         np.testing.assert_array_equal(found.displacement.sel(mesh_type="cut"), found.displacement.sel(mesh_type="good"))
 
 
-def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
+def test_a_run_with_holes_says_a_line_for_each_stage(tmp_path, repository):
     for name in ("Snakefile", "profiles", "workflow"):
         (tmp_path / name).symlink_to(repository / name)
     grid = "{beam: a, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1e12 N"
@@ -77,13 +77,6 @@ def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 
-    code, text = run("--strict")
-    assert code == 3, text
-    assert text.endswith("--strict: 1 scenes are not solved\n")
-    assert "Select jobs" not in text and text.count("\nMeshing: done; ") == 1  # a line for each stage
-    dataset = tmp_path / "results/hole/dataset.nc"
-    dataset.write_bytes(dataset.read_bytes()[:1000])
-    code, text = run("--strict")
-    assert code == 1 and "dataset.nc: cannot be read (" in text and "delete it" in text and "Traceback" not in text, (
-        text
-    )
+    code, text = run()
+    assert code == 0, text
+    assert "Select jobs" not in text and text.count("\nMeshing: done; ") == 1

@@ -1,7 +1,6 @@
 """Run a study: check it, find outdated and damaged results, and call Snakemake."""
 
 import os
-import signal
 import subprocess
 import sys
 import warnings
@@ -19,28 +18,22 @@ from .options import allow, max_scenes
 if TYPE_CHECKING:
     from ..studies.config.model import Study
 
-NOT_SOLVED = 3
-"""Exit code of a strict run with unsolved scenes."""
-
-
 @click.command(
     epilog=examples(
         "springtune run config/mine.yaml",
         "springtune run config/mine.yaml --cores 4",
         "springtune run config/mine.yaml -n",
-        "springtune run --strict config/mine.yaml",
         "springtune run config/mine.yaml --workflow-profile slurm",
     ),
     context_settings={"ignore_unknown_options": True},
-    options_metavar="[--strict] [--max-scenes N] [--results FOLDER]",
+    options_metavar="[--max-scenes N] [--results FOLDER]",
 )
 @max_scenes
 @click.option(
     "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
 )
-@click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
-def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[str, ...]) -> None:
+def run(most: int | None, results: Path | None, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All options but those
@@ -103,13 +96,11 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
             from ..studies.output.summary import reminder
 
             click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
-            raise SystemExit(_strictly(strict, study))
+            return
     # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
     # begins with - is not an option behind =.
     command = [*_snakemake(), *forced, *workflow, *options, f"--configfile={path}"]
-    if not strict or not _computes(options):
-        os.execv(command[0], command)
-    raise SystemExit(_called(command) or _strictly(strict, study))
+    os.execv(command[0], command)
 
 
 def set_cache() -> None:
@@ -190,14 +181,6 @@ def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
     return found if found or None not in each else None
 
 
-def _strictly(strict: bool, study: "Study") -> int:
-    """Exit code of a complete run."""
-    count = _unsolved(_results(study) / "dataset.nc") if strict else 0
-    if count:
-        click.echo(f"--strict: {count} scenes are not solved", err=True)
-    return NOT_SOLVED if count else 0
-
-
 SLURM = "snakemake_executor_plugin_slurm"
 """Package of the plugin; without it Snakemake only reports unknown options of the profile."""
 
@@ -219,31 +202,3 @@ def _snakemake() -> list[str]:
     """Command of Snakemake on this Python."""
     beside = Path(sys.executable).with_name("snakemake")
     return [str(beside)] if beside.exists() else [sys.executable, "-m", "snakemake"]
-
-
-def _called(command: list[str]) -> int:
-    """Run a command and return its exit code; signals to this program are passed on, and its end is awaited."""
-    process = subprocess.Popen(command)
-    signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
-    while True:
-        try:
-            return process.wait()
-        except KeyboardInterrupt:
-            continue
-
-
-def _unsolved(path: Path) -> int:
-    """Number of unsolved scenes of a dataset; 0 if there is none yet."""
-    import h5py
-
-    from ..problem.status import Status
-
-    try:
-        with h5py.File(path) as file:
-            status = file["status"][()]
-    except FileNotFoundError:
-        return 0
-    except (OSError, KeyError) as error:
-        why = f"cannot be read ({error}); delete it, and the same command makes it again"
-        raise click.ClickException(f"{path}: {why}") from None
-    return int(((status != Status.NOT_REQUESTED) & (status != Status.SOLVED)).sum())
