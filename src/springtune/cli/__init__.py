@@ -73,10 +73,6 @@ def in_options(message: str, command: click.Command | None) -> str:
     return message
 
 
-SAID = f"{__name__}.said"
-"""Warnings of a command, in its context."""
-
-
 COMPLETION = "_SPRINGTUNE_COMPLETE"
 """Environment variable by which a shell asks click for completions."""
 
@@ -177,20 +173,14 @@ def main() -> None:
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """
-    usual, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, {})
+    usual, said = warnings.showwarning, set[str]()
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
-        # Not imported, so that --help does not wait for them.
-        if category.__name__ in ("AssumptionWarning", "PluginWarning"):
-            said[f"warning: {shown(message)}"] = None  # each once, in this order
-        else:
+        # By name: importing them would let --help wait.
+        if category.__name__ not in ("AssumptionWarning", "PluginWarning"):
             usual(message, category, *where, **further)
+        elif (line := f"warning: {shown(message)}") not in said:
+            said.add(line)
+            click.echo(line, err=True)
 
     warnings.showwarning = show
-
-
-@main.result_callback()
-def warn(*_: Any, **__: Any) -> None:
-    """Print warnings of broken assumptions of the model below an answer."""
-    for line in click.get_current_context().meta[SAID]:
-        click.echo(line, err=True)

@@ -11,7 +11,6 @@ from ..safe_io.escapes import clipped, shown
 from ..safe_io.tables import aligned
 from ..studies.output.text import cell_text, paragraphs, variable_name
 from . import WrongCall, examples
-from .options import dataset_path
 
 if TYPE_CHECKING:
     from ..studies.output.comparison import Change, Comparison, GroupChanges
@@ -38,7 +37,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.command(
     epilog=examples(
         "springtune diff results/before results/mine",
-        "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
+        "springtune diff before.nc results/mine --relative 1e-3 --group sensitivity",
     )
 )
 @click.argument("before")
@@ -63,7 +62,7 @@ def diff(
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
-    BEFORE and AFTER are results/<study>, its dataset.nc, or the name of a study. Scenes are matched by their labels, in
+    BEFORE and AFTER are results/<study>, or its dataset.nc. Scenes are matched by their labels, in
     whatever order. Numbers are the same within --relative or --absolute, and NaN is NaN; along a curve or over a field
     --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
     not compared; versions and the studies' files are told and make no difference.
@@ -74,7 +73,7 @@ def diff(
     from ..studies.output.comparison import RELATIVE, Tolerance, compare
 
     try:
-        paths = [dataset_path(before), dataset_path(after)]
+        paths = [reading.dataset_file(before), reading.dataset_file(after)]
         with (
             reading.open(paths[0]) as one,
             reading.open(paths[1]) as other,

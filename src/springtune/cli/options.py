@@ -311,21 +311,6 @@ def add_options(each: Options) -> Callable[[AnyCommand], AnyCommand]:
     )
 
 
-RESULTS_FOLDER, DATASET = Path("results"), "dataset.nc"
-
-
-def dataset_path(given: str) -> Path:
-    """Path of the dataset of a study's name, folder or file."""
-    for file in (Path(given), Path(given, DATASET), RESULTS_FOLDER / given / DATASET):
-        if file.is_file():
-            return file
-    known = ", ".join(sorted(file.parent.name for file in RESULTS_FOLDER.glob(f"*/{DATASET}"))) or "none"
-    raise ValueError(
-        f"{given}: there is no such dataset; run the study, or give a dataset.nc, results/<study> or a study's name; "
-        f"in results/ here: {known}"
-    )
-
-
 max_scenes = click.option(
     "--max-scenes",
     "most",

@@ -10,7 +10,6 @@ from ..registry import how_to_install
 from ..studies.output.text import bytes_text
 from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
-from .options import RESULTS_FOLDER
 
 if TYPE_CHECKING:
     from ..studies.config.model import Study
@@ -108,7 +107,7 @@ def _study_and_folder(given: Path) -> "tuple[Study, Path]":
             raise click.ClickException(f"{given}: there is no {config}; give the study's YAML file instead")
         return load_study(config), given
     study = load_study(given)
-    folder = RESULTS_FOLDER / study.name
+    folder = Path("results", study.name)
     if not folder.is_dir():
         raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
     check_claim(folder, given)

@@ -18,6 +18,7 @@ from .options import allow, max_scenes
 if TYPE_CHECKING:
     from ..studies.config.model import Study
 
+
 @click.command(
     epilog=examples(
         "springtune run config/mine.yaml",

@@ -28,7 +28,7 @@ FEWER = "give shorter lists, or split the study into several"
 
 MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
 
-SEPARATE = "give them grids of their own"
+ANOTHER = "take another definition, or give each a grid of its own"
 
 
 # -- names -------------------------------------------------------------------------------------------------------------
@@ -138,17 +138,15 @@ def check_product(problems: Problems, section: object, path: Sequence[Key], labe
 def check_scenes(config: StudyConfig, problems: Problems) -> None:
     """Check the number of scenes, and of cells, before grids are expanded."""
     try:
-        left = most_scenes()
+        left, what = most_scenes(), "scenes"
     except ValueError as error:
         problems.stop_at((), str(error))
-    what = "scenes"
     labels: dict[str, set[Any]] = defaultdict(set)
     for name, grid in config.grids.items():
-        parts = factors(grid)
-        lists = {" and ".join(group): rows for group, rows in parts}
-        left -= check_count(problems, ("grids", name), lists, left, what, f"{FEWER}, {MORE_SCENES}")
+        parts = {" and ".join(group): rows for group, rows in factors(grid)}
+        left -= check_count(problems, ("grids", name), parts, left, what, f"{FEWER}, {MORE_SCENES}")
         what = "scenes beside those of the grids above"
-        for group, rows in parts:
+        for group, rows in factors(grid):
             for label, values in zip(group, zip(*rows)):
                 labels[label] |= set(values)
     problems.stop()
@@ -231,26 +229,27 @@ def check_files(meshes: Iterable[MeshSpec], scenes: Iterable[SceneSpec], problem
 
 
 def check_able(
-    problems: Problems, path: Sequence[Key], names: Iterable[str], why: str, corners: int = 0, stretched: bool = True
+    problems: Problems,
+    path: Sequence[Key],
+    names: Iterable[str],
+    mesh_types: Iterable[str] = (),
+    loads: Iterable[str] = (),
+    derived: bool = True,
 ) -> None:
-    """Check that definitions need no reference and no stated stiffness, and have cells of so many corners.
-
-    Where a beam is not stretched they must not be uniaxial.
-    """
-    able = [
-        name
-        for name, one in DEFINITIONS.items()
-        if not one.needs and (not corners or corners in one.cells) and (stretched or not one.uniaxial)
-    ]
+    """Check that definitions fit mesh types and loads, and, if `derived`, need no reference and no stated stiffness."""
     for name in names:
-        if name not in able:
-            problems.add(path, f"'{name}' {why} choose of {', '.join(able)}")
-
-
-def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:
-    """Check that definitions work on triangles without a reference or a stated stiffness."""
-    why = "is for triangles with a reference or a stated stiffness, or for rectangles;"
-    check_able(problems, path, names, why, 3)
+        one = DEFINITIONS[name]
+        if derived and one.needs:
+            problems.add(path, f"'{name}' needs a reference or a stated stiffness, which grids alone have; {ANOTHER}")
+        for mesh_type in mesh_types:
+            made = MESH_TYPES.get(mesh_type)
+            if made and made.corners not in one.cells:
+                needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
+                problems.add(path, f"'{name}' needs {needs} and mesh type '{mesh_type}' has {has}; {ANOTHER}")
+        for load in loads if one.uniaxial else ():
+            if not LOADS[load].kind.uniaxial:
+                kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
+                problems.add(path, f"'{name}' is for {kinds} and load '{load}' is neither; {ANOTHER}")
 
 
 def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Problems) -> None:
@@ -259,13 +258,7 @@ def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Prob
     for grid in grids:
         path = ("grids", grid.name, "definition")
         for name, mesh_type, load in dict.fromkeys((s.definition, s.mesh.mesh_type, s.load) for s in grid.scenes):
-            definition, made = DEFINITIONS[name], MESH_TYPES.get(mesh_type)
-            if made and made.corners not in definition.cells:
-                needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
-                problems.add(path, f"'{name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}")
-            if definition.uniaxial and not LOADS[load].kind.uniaxial:
-                kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
-                problems.add(path, f"'{name}' is for {kinds} and load '{load}' is neither; {SEPARATE}")
+            check_able(problems, path, [name], [mesh_type], [load], derived=False)
             if name == "calibrated" and not config.definitions.calibrated:
                 problems.add(path, "'calibrated' needs to know on what; add definitions.calibrated, a beam and a load")
         paper = (scene for scene in grid.scenes if scene.definition == "paper")

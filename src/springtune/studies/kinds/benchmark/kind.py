@@ -93,7 +93,7 @@ def _check(config, problems):
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)
         check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
-    check_able(problems, ("benchmark", "definition"), section.definition, "needs more than mesh and material;")
+    check_able(problems, ("benchmark", "definition"), section.definition)
     for name in section.mesh_type:
         check_known(problems, ("benchmark", "mesh_type"), "mesh type", name, MESH_TYPES, None)
     approaches = approach_names(section.definition, section.mesh_type, section.approach)

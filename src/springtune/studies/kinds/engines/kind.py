@@ -142,9 +142,7 @@ def _check(config, problems):
             checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:
                 scene = section.scenes[one]
-                corners, uniaxial = MESH_TYPES[scene.mesh_type].corners, LOADS[scene.load].kind.uniaxial
-                why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{one}' has;"
-                checks.check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
+                checks.check_able(problems, (*place, "definition"), runs.definition, [scene.mesh_type], [scene.load])
         checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
     lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS}
     lists["scene"] = {*section.scenes}

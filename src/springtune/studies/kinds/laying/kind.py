@@ -11,7 +11,7 @@ from springtune.problem.geometry import Strip, Trapezoid
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import check_beam_material, check_for_triangles, check_particles, check_product
+from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind, Stage
 from ...runs.keys import definition_key, material_key, mesh_type_key
@@ -92,7 +92,7 @@ class LayingConfig(Section):
 def _check(config, problems):
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
-    check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
+    check_able(problems, ("laying", "definition"), config.laying.definition, ["structured"])
     check_product(problems, config.laying, ("laying",), OF_STRIP, MOST_STRIPS)
     if config.laying.strip in config.beams:
         beam = config.beams[config.laying.strip]

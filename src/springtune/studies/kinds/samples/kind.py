@@ -5,7 +5,6 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, WithJsonSchema, create_model
 
-from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
@@ -226,12 +225,7 @@ def _check(config, problems):
         _check_sizes(sample, problems)
     if not sample.varied:
         problems.add(where, "nothing varies; give at least one parameter a range such as {from: 100 mm, to: 400 mm}")
-    path, why = (
-        ("samples", "definition"),
-        "needs a reference, a stated stiffness, or other cells or loads than this sample has;",
-    )
-    made, uniaxial = MESH_TYPES[sample.mesh_type], all(LOADS[name].kind.uniaxial for name in sample.load)
-    check_able(problems, path, sample.definition, why, made.corners, uniaxial)
+    check_able(problems, ("samples", "definition"), sample.definition, [sample.mesh_type], sample.load)
     most = most_scenes()
     if sample.scenes > most:
         each = f"{sample.each} rows x {len(sample.load)} loads x {len(sample.definition)} definitions"

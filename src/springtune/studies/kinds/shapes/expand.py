@@ -18,7 +18,7 @@ from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.springs.base import DEFINITIONS
 
-from ...config.checks import FEWER, check_density, check_for_triangles, check_particles
+from ...config.checks import FEWER, check_able, check_density, check_particles
 from ...config.expand import file_fault
 from .outputs import MADE, OWN_FILE, mesh_name
 
@@ -315,7 +315,7 @@ def _check_stems(config, problems):
 
 
 def _check_grid(config, grid, path, problems):
-    check_for_triangles(grid.definition, (*path, "definition"), problems)
+    check_able(problems, (*path, "definition"), grid.definition, [MADE])
     for name in grid.definition:
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")

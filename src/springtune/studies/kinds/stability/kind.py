@@ -9,7 +9,7 @@ from springtune.mechanics.integrators import BEHAVIOURS
 from springtune.mesh.types import MESH_TYPES
 
 from ...config import fields
-from ...config.checks import check_beam_material, check_density, check_for_triangles, check_particles
+from ...config.checks import check_able, check_beam_material, check_density, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind, Stage
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -52,7 +52,7 @@ def _check(config, problems):
     section = config.stability
     check_beam_material(problems, ("stability", "material"), section.material, config)
     check_density(config, section.material, ("stability", "material"), problems)
-    check_for_triangles(section.definition, ("stability", "definition"), problems)
+    check_able(problems, ("stability", "definition"), section.definition, ["structured"])
     made = [name for name, one in MESH_TYPES.items() if one.corners == 3]
     if section.mesh_type not in made:
         message = f"'{section.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
