@@ -79,7 +79,7 @@ STUDIES = {
         "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
     ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
-    "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give a length such as"),
+    "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give at most 1000"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
     "aliases of aliases": (
         "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)),

@@ -113,7 +113,9 @@ def declared(what: str, section: str, beside: Collection[str] = ()) -> AfterVali
     def known(name: str, info: ValidationInfo) -> str:
         names = () if info.context is None else info.context.get(section, ())
         if info.context is not None and names is not None and name not in names and name not in beside:
-            raise refuse(f"unknown {what} '{name}'; {nearest(name, [*beside, *names])}; or declare it under {section}")
+            raise refuse(
+                f"unknown {what} {show(name)}; {nearest(name, [*beside, *names])}; or declare it under {section}"
+            )
         return name
 
     return AfterValidator(known)

@@ -204,6 +204,8 @@ def _message(model: Any, details: Any, path: tuple[Key, ...], value: Any) -> str
         return f"'{path[-1]}' is missing; give {words(field)}"
     if details["type"] == "model_type":
         return f"{show(value)} instead of keys and values; give the keys {', '.join(map(str, _keys(field)))}"
+    if details["type"] == "too_long":
+        return f"{len(value)} values; give at most {details['ctx']['max_length']}, or split the study into several"
     why = WHY.get(details["type"], "does not fit") if isinstance(value, str) else f"instead of {words(field)}"
     return f"{show(value)} {why}; give {words(field)}"
 
