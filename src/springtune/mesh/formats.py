@@ -23,11 +23,8 @@ from .content import IN_OTHER_FILES, LINEAR, Block, Content
 from .groups import GroupedMesh, part_names
 from .sheets import DIGITS, box_fault, in_words, on_sides, outline_of, sheet_fault
 
-CELLS = {"triangle": 3, "quad": 4}
-"""Corners of the cells that can be read, by meshio's name."""
-
-CELL_DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
-"""Of cells that are read and of those that make groups, by meshio's name."""
+CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
+"""Points of cells that are read and of those that make groups, by meshio's name."""
 
 PART_NUMBERS = "part"
 """Cell data whose whole numbers are parts of the body; 0 is the main one."""
@@ -94,7 +91,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     places: list[np.ndarray] = []
     blocks: list[tuple[str, np.ndarray, str]] = []
     labels = part_names(grouped)
-    for name, count in CELLS.items():
+    for name, count in CORNERS.items():
         for part in ("", *grouped.parts) if count in labels else ():
             mask = labels[count] == part
             if mask.any():
@@ -152,10 +149,8 @@ def _assembled(path: str | Path, content: Content, unit: float, most: float = MO
         raise MeshError(f"{path}: {len(content.points)} points, and at most {most} are read; write a coarser mesh")
     cells: dict[int, list[np.ndarray]] = defaultdict(list)
     for kind, corners in content.cells:
-        if kind not in CELL_DIMENSIONS:
-            raise MeshError(f"{path}: has cells '{kind}'; {LINEAR}")
-        if kind in CELLS and len(corners):
-            cells[CELLS[kind]].append(corners)
+        if CORNERS[kind] > 2 and len(corners):
+            cells[CORNERS[kind]].append(corners)
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
     joined = {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
@@ -254,19 +249,25 @@ def _by_meshio(found: Any) -> Content:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         shape = " x ".join(map(str, points.shape))
         raise MeshError(f"coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
+    if others := [block.type for block in found.cells if block.type not in CORNERS]:
+        raise MeshError(f"has cells '{others[0]}'; {LINEAR}")
     content = Content(points, [Block(block.type, np.asarray(block.data)) for block in found.cells])
     for kind, corners in content.cells:
-        if kind in CELLS and len(corners) and (corners.shape[1:] != (CELLS[kind],) or corners.dtype.kind not in "iu"):
+        if len(corners) and (corners.shape[1:] != (CORNERS[kind],) or corners.dtype.kind not in "iu"):
             shape = f"numbers {corners.dtype} of shape {corners.shape}"
             raise MeshError(f"cells '{kind}' by {shape}; write the mesh again")
     starts = content.starts()
     for name in found.field_data:
         content.cell_groups[name] = []
     for name, blocks in found.cell_sets.items():
-        content.cell_groups[name] = [np.ravel(own).astype(int) + start for own, start in zip(blocks, starts)]
+        if len(blocks) != len(content.cells):
+            content.unusable[name] = "is a set of which meshio does not tell the cells; give it as cells"
+            continue
+        members = ((own, start) for own, start in zip(blocks, starts) if own is not None)
+        content.cell_groups[name] = [np.ravel(own).astype(np.int64) + start for own, start in members]
     for name, nodes in found.point_sets.items():
         content.point_groups[name].append(np.ravel(nodes).astype(np.int64))
-    dimensions = np.repeat([CELL_DIMENSIONS.get(kind, 3) for kind, _ in content.cells], np.diff(starts))
+    dimensions = np.repeat([min(CORNERS[kind] - 1, 2) for kind, _ in content.cells], np.diff(starts))
     names = {tuple(map(int, one)): name for name, one in found.field_data.items() if len(one) == 2}
     for key, arrays in found.cell_data.items():
         values = np.concatenate(arrays)
@@ -426,7 +427,7 @@ class _Groups:
         cells = [(kind, corners, own) for (kind, corners), own in zip(content.cells, np.split(mask, starts[1:-1]))]
         lines = [corners[own] for kind, corners, own in cells if kind == "line"]
         vertices = [corners[own].ravel() for kind, corners, own in cells if kind == "vertex"]
-        masks = {n: np.concatenate([own for kind, _, own in cells if CELLS.get(kind) == n]) for n in self.mesh.cells}
+        masks = {n: np.concatenate([own for kind, _, own in cells if CORNERS[kind] == n]) for n in self.mesh.cells}
         edges = np.unique(np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]), axis=0)
         nodes = np.unique(np.concatenate([[], *vertices, *content.point_groups.get(name, [])]).astype(np.int64))
         if not NAME.fullmatch(name):
