@@ -257,8 +257,8 @@ def _by_meshio(found: Any) -> Content:
             shape = f"numbers {corners.dtype} of shape {corners.shape}"
             raise MeshError(f"cells '{kind}' by {shape}; write the mesh again")
     starts = content.starts()
-    for name in found.field_data:
-        content.cell_groups[name] = []
+    # Names with a colon are notes of a format, as of MED.
+    content.cell_groups.update({name: [] for name in found.field_data if ":" not in name})
     for name, blocks in found.cell_sets.items():
         if len(blocks) != len(content.cells):
             content.unusable[name] = "is a set of which meshio does not tell the cells; give it as cells"
@@ -395,7 +395,7 @@ class _Groups:
         sides, points, parts = {}, {}, {}
         unusable = dict(content.unusable)
         for name in {**content.cell_groups, **content.point_groups}:
-            if ":" in name or name in unusable:  # others are notes of a format, as of MED
+            if name in unusable:
                 continue
             try:
                 lines, nodes, cells = self._members(name, content)
