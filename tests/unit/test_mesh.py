@@ -258,13 +258,13 @@ class TestSlits:
         away = np.isin(mesh.triangles, np.flatnonzero((mesh.points == [0.05, 0.01]).all(axis=1))).any(axis=1)
         order = np.argsort(mesh.points[mesh.triangles[away]].mean(axis=1).sum(axis=1))
         opposite = np.flatnonzero(away)[order[[0, -1]]]
-        said = "cover 98.75 % of the box .* inside the box with one cell only: 6, the first .*; close the hole"
+        said = r"cover 98.75 % of the box .* cells hang together in a point alone, at \(50, 10\) mm; join them"
         refuse(tmp_path / "holes.vtu", mesh.points, {3: np.delete(mesh.triangles, opposite, axis=0)}, said)
 
     def test_sheets_on_top_of_each_other(self, tmp_path):
         mesh, other = self.MESH, MESH_TYPES["alternating"](0.1, 0.02, 5e-3)
         apart, points = np.vstack([mesh.triangles, other.triangles + len(mesh.points)]), [mesh.points, other.points]
-        said = "cover 200 % of the box or overlap: the outline runs .* more than once; give"
+        said = "cover 200 % of the box or overlap: two points at .*, do not join their cells"
         refuse(tmp_path / "two.vtu", np.vstack(points), {3: apart}, said)
         said = "cover 200 % .* edges with two cells on the same side: .*; remove one"
         refuse(tmp_path / "one.vtu", mesh.points, {3: np.vstack([mesh.triangles, other.triangles])}, said)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import springtune as st
-from springtune.mesh import Mesh, MeshError, quality, signed_areas, write_mesh
+from springtune.mesh import MESH_TYPES, Mesh, MeshError, quality, signed_areas, write_mesh
 from springtune.mesh.formats import read_shape
 from springtune.mesh.groups import GroupedMesh
 from springtune.mesh.outlines import mesh_shape
@@ -350,6 +350,15 @@ def two_squares(shift, joined=0):
     return Mesh(points[used], cells.reshape(-1, 3))
 
 
+def hanging():
+    """Squares, one triangle of which is split at the middle of its edge; its neighbour there is not."""
+    mesh = MESH_TYPES["right"](4.0, 4.0, 1.0)
+    a, b, new = *(int(np.flatnonzero((mesh.points == [x, 1.0]).all(axis=1))[0]) for x in (1.0, 2.0)), len(mesh.points)
+    cell = np.flatnonzero(np.isin(mesh.triangles, (a, b)).sum(axis=1) == 2)[0]
+    halves = [np.where(mesh.triangles[cell] == end, new, mesh.triangles[cell]) for end in (a, b)]
+    return Mesh(np.vstack([mesh.points, [1.5, 1.0]]), np.vstack([np.delete(mesh.triangles, cell, axis=0), halves]))
+
+
 FAULTS = {
     "apart": (two_squares([2, 0]), ""),
     "joined": (two_squares([1, 0], joined=2), ""),
@@ -358,6 +367,7 @@ FAULTS = {
     "point": (two_squares([1, 1], joined=1), "cells hang together in a point alone, at (1000, 1000) mm"),
     "touching points": (two_squares([1, 1]), "two points at (1000, 1000) mm, do not join"),
     "hanging": (two_squares([1, 0.5]), "hangs on the edge"),
+    "hanging inside": (hanging(), "the point at (1500, 1000) mm hangs on the edge"),
     "overlap": (two_squares([0.5, 0.3]), "cells overlap"),
     "inside": (
         Mesh(np.concatenate([UNIT, 0.3 + 0.2 * UNIT]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),

@@ -30,9 +30,16 @@ def sheet_fault(mesh: Mesh) -> str:
     if fault:
         return fault
     points = mesh.points
-    shortest = np.linalg.norm(np.diff(points[outline], axis=1), axis=2).min()
-    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * shortest)
-    touching = np.union1d(*nearer(points, outline, np.full(len(outline), 0.5 * small))[:2])
+    ways = np.diff(points[outline], axis=1)[:, 0]
+    lengths = np.linalg.norm(ways, axis=1)
+    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * lengths.min())
+    touching = nearer(points, outline, np.full(len(outline), 0.5 * small))[:2]
+    # Edges that share a point touch where the outline turns back on itself there.
+    order, (x, y) = np.argsort(outline[:, 0]), (ways / lengths[:, None]).T
+    low, high = (np.searchsorted(outline[order, 0], outline[:, 1], side) for side in ("left", "right"))
+    after = order[np.minimum(low + np.arange((high - low).max())[:, None], high - 1)]
+    which, back = np.nonzero((x * x[after] + y * y[after] < 0) & (np.abs(x * y[after] - y * x[after]) < DIGITS))
+    touching = np.unique(np.concatenate([*touching, back, after[which, back]]))
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
         first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"
@@ -226,31 +233,19 @@ def box_fault(mesh: Mesh) -> str:
 def _misfilled(mesh: Mesh, box: np.ndarray) -> str:
     """Return why a mesh does not fill a box exactly once, with the remedy, or an empty string.
 
-    All cells are convex and counter-clockwise, no two lie on one side of an edge, and the edges with one cell make
-    one round of the box. So as many cells cover a point as that round winds about it: one. This excludes slits, holes
-    and overlaps of any width, and parts that meet in a point.
+    A conforming plane sheet whose outline is on the sides of the box has no slits, holes or overlaps of any width.
     """
-    points = mesh.points
-    fault = not_convex(mesh)
-    if fault:
-        return fault
     share = mesh.area / box.prod()
     lead = f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > DIGITS else ""
-    outline, fault = outline_of(mesh)
-    if fault:
-        return lead + fault
-    ends = points[outline]
+    fault = sheet_fault(mesh)
+    outline, _ = outline_of(mesh)
+    ends = mesh.points[outline]
     on_side = [(ends[..., axis] == value).all(axis=1) for axis in range(2) for value in (0.0, box[axis])]
-    inside = ~np.any(on_side, axis=0)
-    if inside.any():
-        count = f"edges inside the box with one cell only: {inside.sum()}"
-        first = f"{count}, the first one {edge_in_words(points, outline[inside][0])}; close the hole there"
-        return lead + (opening(points, outline[inside], count) or first)
-    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
-    if len(again) or lead:
-        where = in_words(points[again[0] if len(again) else outline[0, 0]])
-        return f"{lead}the outline runs through {where} more than once; give a mesh that fills the box once"
-    return ""
+    inside = outline[~np.any(on_side, axis=0)]
+    if len(inside) and not fault:
+        first = edge_in_words(mesh.points, inside[0])
+        fault = f"edges inside the box with one cell only: {len(inside)}, the first one {first}; close the hole there"
+    return lead + fault if fault else ""
 
 
 def connected(edges: np.ndarray, count: int) -> np.ndarray:
