@@ -33,13 +33,13 @@ def sheet_fault(mesh: Mesh) -> str:
     ways = np.diff(points[outline], axis=1)[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
     small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * lengths.min())
-    touching = nearer(points, outline, np.full(len(outline), 0.5 * small))[:2]
+    one, other, _ = nearer(points, outline, np.full(len(outline), 0.5 * small))
     # Edges that share a point touch where the outline turns back on itself there.
     order, (x, y) = np.argsort(outline[:, 0]), (ways / lengths[:, None]).T
     low, high = (np.searchsorted(outline[order, 0], outline[:, 1], side) for side in ("left", "right"))
     after = order[np.minimum(low + np.arange((high - low).max())[:, None], high - 1)]
     which, back = np.nonzero((x * x[after] + y * y[after] < 0) & (np.abs(x * y[after] - y * x[after]) < DIGITS))
-    touching = np.unique(np.concatenate([*touching, back, after[which, back]]))
+    touching = np.unique(np.concatenate([one, other, back, after[which, back]]))
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
         first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"
@@ -48,12 +48,12 @@ def sheet_fault(mesh: Mesh) -> str:
     if len(again):
         where = in_words(points[again[0]])
         return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
-    for one in rounds(outline):
-        others = outline[~np.isin(outline[:, 0], one)]
-        x, y = (points[one] - points[one[0]]).T
+    for line in rounds(outline):
+        others = outline[~np.isin(outline[:, 0], line)]
+        x, y = (points[line] - points[line[0]]).T
         outer = (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() > 0
-        if _winding(points, others, points[one[0]]) != (0 if outer else 1):
-            return f"cells lie over each other at {in_words(points[one[0]])}; remove some"
+        if _winding(points, others, points[line[0]]) != (0 if outer else 1):
+            return f"cells lie over each other at {in_words(points[line[0]])}; remove some"
     return ""
 
 
