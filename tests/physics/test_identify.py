@@ -1,7 +1,6 @@
 """Constants of a sheet from measured tests: synthetic ones with noise, rubber's, and what is refused."""
 
 import re
-import shutil
 from functools import cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -219,7 +218,7 @@ def test_points_without_numbers_are_left_out(tmp_path, cell):
 
 NOT_AS_STATED = {
     "v runs down": (SHEET, "traction", lambda _, moved, __: moved * [1, -1], "change the sign of v"),
-    "v of shear": (SHEET, "shear", lambda _, moved, __: moved * [1, -1], "with v reversed|does not fit"),
+    "v of shear": (SHEET, "shear", lambda _, moved, __: moved * [1, -1], "does not fit"),
     "windows": (SHEET, "traction", windows, "correlated over some"),
     "isotropic law": (PLY, "shear", lambda _, moved, __: moved, "the law does not fit"),
     "angle": (PLY.rotated(0.3), "traction", lambda _, moved, __: moved, "the law does not fit"),
@@ -292,15 +291,6 @@ def test_estimates_lie_within_their_intervals_as_often_as_they_say(tmp_path):
     assert (180 <= inside).all() and (inside <= 199).all(), inside
 
 
-def test_rubber_has_intervals_and_is_that_of_fit_rubber():
-    file = "config/treloar/uniaxial.csv"
-    for law, terms in (("neo-hooke", 1), ("yeoh", 3)):
-        found = st.identify(file, law)
-        assert found.materials[""].coefficients == st.fit_rubber(file, terms=terms).coefficients
-        assert all(low < found.values[name] < high for name, (low, high) in found.intervals.items())
-        assert "residuals are not random" in found.notes[0]  # a law of few terms does not follow the test
-
-
 @pytest.mark.parametrize(("text", "message"), refused_files("measured"))
 def test_a_bad_file_is_refused(tmp_path, text, message):
     path = tmp_path / "bad.csv"
@@ -310,26 +300,19 @@ def test_a_bad_file_is_refused(tmp_path, text, message):
     assert message in str(error.value) and "bad.csv" in str(error.value) and ";" in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "name", "law"),
-    [
-        ("pull.yaml", "measured", st.Material("3 GPa", 0.35)),
-        ("rubber.csv --law yeoh", "rubber", st.fit_rubber("config/treloar/uniaxial.csv")),
-    ],
-)
-def test_the_command_prints_materials_that_a_study_takes(tmp_path, monkeypatch, arguments, name, law):
-    curve(tmp_path / "c.csv", st.Material("3 GPa", 0.35), noise=2e-6)
-    shutil.copy("config/treloar/uniaxial.csv", tmp_path / "rubber.csv")
+def test_the_command_prints_materials_that_a_study_takes(tmp_path, monkeypatch):
+    law = st.Material("3 GPa", 0.35)
+    curve(tmp_path / "c.csv", law, noise=2e-6)
     monkeypatch.chdir(tmp_path)
     Path("pull.yaml").write_text("tests: {pull: {beam: 100x20, load: traction, file: c.csv}}")
-    made = CliRunner().invoke(main, ["identify", *arguments.split(), "--plot", "residuals.png"])
+    made = CliRunner().invoke(main, ["identify", "pull.yaml", "--plot", "residuals.png"])
     assert made.exit_code == 0, made.output
     assert "95 %" in made.output and Path("residuals.png").stat().st_size > 5000
     study = yaml.safe_load(template_text(Path("x"), "beam")) | yaml.safe_load(made.output.split("in a study:\n")[1])
     for grid in study["grids"].values():
-        grid |= {"material": name}
+        grid |= {"material": "measured"}
     Path("mine.yaml").write_text(yaml.safe_dump(study))
-    found = st.load_study("mine.yaml").materials[name]
+    found = st.load_study("mine.yaml").materials["measured"]
     assert found.young_modulus == pytest.approx(law.young_modulus, rel=0.02)
     assert found.poisson_ratio == pytest.approx(law.poisson_ratio, abs=0.05)
 

@@ -23,11 +23,10 @@ PLOT_ENDINGS = (".png", ".svg", ".pdf")
         "springtune identify pull.csv --beam 100x20 --load traction",
         'springtune identify dic.csv --beam 100x20 --load traction --force "400 N" --noise "1 um" --plot residuals.png',
         "springtune identify tests.yaml --law orthotropic",
-        "springtune identify config/treloar/uniaxial.csv --law yeoh",
     )
 )
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--law", default="isotropic", show_default=True, help="isotropic, orthotropic, regions, yeoh, neo-hooke.")
+@click.option("--law", default="isotropic", show_default=True, help="isotropic, orthotropic, regions.")
 @click.option("--known", multiple=True, help="A constant that is known, such as nu=0.3; may be repeated.")
 @click.option("--beam", help="Length x height in mm, such as 100x20.")
 @click.option("--study", help=f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}.")
@@ -45,7 +44,6 @@ def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], plot: Pa
     have units in their heads, such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'.
     """
     from ..safe_io.atomic import check_folder, replacing
-    from ..scene.identify import SHEET_LAWS
     from ..scene.identify import identify as identified
 
     if plot:
@@ -53,11 +51,8 @@ def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], plot: Pa
             raise ValueError(f"--plot: '{plot}' has another ending than {', '.join(PLOT_ENDINGS)}; give one")
         check_folder(plot)
     rows = [options | row for path in files for row in _rows(path)]
-    if SHEET_LAWS.get(law) == ():
-        found = identified(files[0] if len(files) == 1 else [], law)
-    else:
-        given = {name: value for name, _, value in (one.partition("=") for one in known)}
-        found = identified([_test(**row) for row in rows], law, known=given)
+    given = {name: value for name, _, value in (one.partition("=") for one in known)}
+    found = identified([_test(**row) for row in rows], law, known=given)
     if plot:
         import matplotlib.pyplot as plt
 
@@ -65,7 +60,7 @@ def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], plot: Pa
         with writing("--plot", plot), replacing(plot) as unfinished:
             plt.savefig(unfinished, format=plot.suffix[1:])
         plt.close()
-    click.echo(f"{found}\n\nin a study:\n{_materials(found, rows[0]['file'])}", nl=False)
+    click.echo(f"{found}\n\nin a study:\n{_materials(found)}", nl=False)
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
@@ -109,7 +104,7 @@ def _test(
     return MeasuredTest(body, load, file, **others)
 
 
-def _materials(found: "Identified", file: Path) -> str:
+def _materials(found: "Identified") -> str:
     """Materials that were found, as a section of a study."""
     from yaml import safe_dump
 
@@ -117,9 +112,7 @@ def _materials(found: "Identified", file: Path) -> str:
     if found.law == "orthotropic":
         keys = ("young_modulus_x", "young_modulus_y", "poisson_ratio_xy", "shear_modulus")
         materials = [dict(zip(keys, texts))]
-    elif "nu" in found.values:
-        materials = [{"young_modulus": text, "poisson_ratio": texts[-1]} for text in texts[:-1]]
     else:
-        materials = [{"uniaxial_test": str(file), "terms": len(texts)}]
+        materials = [{"young_modulus": text, "poisson_ratio": texts[-1]} for text in texts[:-1]]
     names = [one.name for one in found.materials.values()]
     return safe_dump({"materials": dict(zip(names, materials))}, sort_keys=False)

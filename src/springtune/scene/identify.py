@@ -8,7 +8,6 @@ residuals r and derivatives J, both over the noise and without shifts, the covar
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +18,14 @@ from scipy.stats import f, t
 from ..mesh.groups import parts_of
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, rotated
 from ..problem.quantities import Number, nearest, positive
-from ..problem.rubber import TestDataError, fit_rubber, relative_weights, stress_columns, told
+from ..problem.rubber import TestDataError
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
 from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
+from .meshes import is_a
 from .residuals import FEWEST_POINTS, Noise, correlated, excess, measured
 from .sheet import chosen
 
@@ -36,8 +36,6 @@ SHEET_LAWS = {
     "isotropic": ("E", "nu"),
     "orthotropic": ("E1", "E2", "nu12", "G12"),
     "regions": ("nu",),
-    "yeoh": (),
-    "neo-hooke": (),
 }
 """Laws, and the names of their constants; regions have a modulus each, too, such as ``E core``."""
 
@@ -107,9 +105,7 @@ def moderate(constants: dict[str, Any]) -> dict[str, Any]:
 
 
 def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
-    """`ENTRIES` of each part, turned by an angle [rad], shape (n_parts, 6); coefficients of rubber, shape (n,)."""
-    if "c1" in constants:
-        return np.array([*constants.values()])
+    """`ENTRIES` of each part, turned by an angle [rad], shape (n_parts, 6)."""
     *moduli, nu = constants.values()
     each = [(one, one, nu, one / (2 * (1 + nu))) for one in moduli]
     found = []
@@ -133,12 +129,9 @@ def squares(tables: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
 
 
 class Model:
-    """Tests as functions of constants: for each a family of solutions, its numbers, and the material's angle.
+    """Tests as functions of constants: for each a family of solutions, its numbers, and the material's angle."""
 
-    Rubber has no family.
-    """
-
-    def __init__(self, tests: Sequence[tuple[Any, list[Block], float]]) -> None:
+    def __init__(self, tests: Sequence[tuple[Family, list[Block], float]]) -> None:
         self.tests, self.blocks = tests, [block for _, own, _ in tests for block in own]
         self.counts = np.array([len(block.values) - block.shifts.shape[1] for block in self.blocks])
         self.sizes = np.array([np.sqrt(np.mean(block.values**2)) or 1.0 for block in self.blocks])
@@ -149,9 +142,7 @@ class Model:
         for family, own, angle in self.tests:
             slopes = [entries(varied(constants, names, step), angle).imag / 1e-30 for step in steps]
             columns = np.stack([entries(constants, angle), *slopes], axis=-1)
-            moved = columns.reshape(-1, columns.shape[-1])
-            if family is not None:  # stresses of rubber are linear in its coefficients
-                moved = family.solve(moved)
+            moved = family.solve(columns.reshape(-1, columns.shape[-1]))
             for block in own:
                 table = block.unshifted(block.factors[:, None] * (block.rows @ moved))
                 table[:, 0] -= block.unshifted(block.values)
@@ -159,12 +150,10 @@ class Model:
         return found
 
     def general(self, constants: dict[str, Any]) -> list[np.ndarray]:
-        """Values of each block and their derivatives by all constants of elasticity; of rubber nothing."""
+        """Values of each block and their derivatives by all constants of elasticity."""
         found = []
         for family, own, angle in self.tests:
             stiffness = entries(constants, angle)
-            if family is None:
-                return [np.zeros((len(block.values), 1)) for block in own]
             steps = np.zeros((len(ENTRIES), 3, 3))  # along the material's axes
             for step, (row, column) in zip(steps, ENTRIES):
                 step[row, column] = step[column, row] = 1
@@ -173,11 +162,6 @@ class Model:
             moved = family.solve(np.column_stack([stiffness.ravel(), every]))
             found += [block.factors[:, None] * (block.rows @ moved) for block in own]
         return found
-
-    def replaced(self, new: Iterable[Block]) -> "Model":
-        """Model with other blocks."""
-        each = iter(new)
-        return Model([(family, [next(each) for _ in own], angle) for family, own, angle in self.tests])
 
     def cleaned(self, constants: dict[str, Any]) -> tuple["Model", list[str]]:
         """Model without values that are no measurements, and notes on these."""
@@ -193,7 +177,8 @@ class Model:
                 out = f"{(~stay).sum()} of {len(stay)} points are left out, the first at {where}"
                 why = "they repeat one value that does not fit, such as 0, or are far from all others"
                 notes.append(f"{block.label}: {out}: {why}")
-        return self.replaced(kept), notes
+        each = iter(kept)
+        return Model([(family, [next(each) for _ in own], angle) for family, own, angle in self.tests]), notes
 
     def undetermined(self, constants: dict[str, Any], names: Sequence[str]) -> list[str]:
         """Named constants whose derivatives are combinations of those by the others."""
@@ -271,10 +256,10 @@ class Identified(Tabled):
     notes : tuple of str
         What the tests do not tell, with the remedy, and signs that the model does not fit.
     noise : dict of str to float
-        Noise of each column or field, given or estimated, in SI units; of rubber relative.
+        Noise of each column or field, given or estimated [m].
     residuals : dict of str to ndarray of float
         Predicted less measured values over the noise [1], without shifts.
-    materials : dict of str to Material, AnisotropicMaterial or Rubber
+    materials : dict of str to Material or AnisotropicMaterial
         The material by part of the body; ``""`` is the main one.
     places : dict of str to ndarray of float
         Loads of a curve, shape (n,), or points of a field [m], shape (n, 2).
@@ -319,7 +304,7 @@ class Identified(Tabled):
         yield from (("note", note) for note in self.notes)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw residuals over their noise: of curves over the load, of fields over x.
+        r"""Draw residuals over their noise: of curves over the load, of fields over x.
 
         Parameters
         ----------
@@ -332,15 +317,18 @@ class Identified(Tabled):
 
         Examples
         --------
+        >>> from pathlib import Path
         >>> import springtune as st
-        >>> st.identify("config/treloar/uniaxial.csv", "neo-hooke").plot().get_ylabel()
+        >>> _ = Path("pull.csv").write_text("force [N],displacement [um]\n0,0.1\n200,13.6\n400,26.9")
+        >>> test = st.MeasuredTest(st.Beam("100 mm", "20 mm"), "traction", "pull.csv")
+        >>> st.identify(test).plot().get_ylabel()
         'Residual over noise [1]'
         """
         return hook("drawing").draw_residuals(ax, self.residuals, self.places)
 
 
 def identify(
-    tests: MeasuredTest | Sequence[MeasuredTest] | str | Path,
+    tests: MeasuredTest | Sequence[MeasuredTest],
     law: str = "isotropic",
     *,
     known: Mapping[str, Number] | None = None,
@@ -349,11 +337,11 @@ def identify(
 
     Parameters
     ----------
-    tests : MeasuredTest or sequence of MeasuredTest, or str or Path
-        Tests of sheets at small strain; of rubber the file of a tensile test, see `springtune.fit_rubber`.
+    tests : MeasuredTest or sequence of MeasuredTest
+        Tests of sheets at small strain; for rubber see `springtune.fit_rubber`.
     law : str, optional
         ``"isotropic"``: E, nu. ``"orthotropic"``: E1, E2, nu12, G12 along the material's axes. ``"regions"``: E of
-        each part of a shape, and one nu. ``"neo-hooke"`` and ``"yeoh"``: c1, and c1 to c3 of rubber.
+        each part of a shape, and one nu.
     known : mapping of str to float or str, optional
         Constants that are known, such as ``{"nu": 0.3}``.
 
@@ -380,20 +368,16 @@ def identify(
     >>> f"{found.values['E'] / 1e9:.0f} GPa", found.undetermined
     ('74 GPa', ('nu',))
     """
-    if isinstance(tests, str | Path) != (not chosen(SHEET_LAWS, law, "law")):
-        raise ValueError(f"tests: {tests!r}; give the file of one test for rubber, else springtune.MeasuredTest")
-    if isinstance(tests, str | Path):
-        return _rubber(tests, law)
-    return _sheet([tests] if isinstance(tests, MeasuredTest) else list(tests), law, known or {})
-
-
-def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number]) -> Identified:
+    constants_of_law = chosen(SHEET_LAWS, law, "law")
+    tests = list(tests) if isinstance(tests, list | tuple) else [tests]
+    for test in tests:
+        is_a(test, MeasuredTest, "tests", "springtune.MeasuredTest(beam, 'traction', 'pull.csv')")
     bodies = [stated(test) for test in tests]
     parts = sorted({part for shape, _, mesh in bodies for part in (parts_of(mesh) if mesh else ("", *shape.parts))})
     regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []
     if len(parts) > 1 and not regions:
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")
-    constants, free = _start([*regions, *SHEET_LAWS[law]], known)
+    constants, free = _start([*regions, *constants_of_law], known or {})
     moduli = [name for name in free if name not in ASSUMED]
     for turn in range(5):  # elements for a usual material, then for what was found, until what is assumed settles
         solved = []
@@ -487,10 +471,7 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
             odd.append(f"{block.label}: residuals are {size:.2g} times the given noise; the model does not fit")
     fitted = {name: value if name in names else np.nan for name, value in constants.items()}
     low, high = (varied(fitted, names, one) for one in (-half, half))
-    negative = [name for name in ASSUMED if high.get(name, 0) < 0]
-    if odd or negative:
-        odd += _reversed(model, constants, names, squares(tables, noise))
-    for name in negative:
+    for name in [name for name in ASSUMED if high.get(name, 0) < 0]:
         remedy = "if this is none of them, change the sign of v or of the transverse displacement, or let y run upwards"
         odd.append(f"{name}: is below zero, as of few materials; {remedy}")
     values = {name: float(value) for name, value in constants.items()}
@@ -510,7 +491,7 @@ def _checked(
     beyond = np.concatenate([block.unshifted(table[:, 1:]) / one for block, table, one in tested])
     others, strong, _ = np.linalg.svd(beyond - left @ (left.T @ beyond), full_matrices=False)
     basis = np.hstack([left, others[:, strong > 1e-6 * sizes[0]]])
-    along, known, elastic = basis.T @ residual, len(sizes), model.tests[0][0] is not None
+    along, known = basis.T @ residual, len(sizes)
     freedom = float(model.counts.sum() - basis.shape[1])
     if freedom < FEWEST_POINTS:
         return np.ones(known), []
@@ -520,7 +501,7 @@ def _checked(
     ends = np.cumsum([len(table) for table in tables])[:-1]
     each = zip(model.blocks, model.counts, noise, *(np.split(one, ends) for one in (rest, law, basis)))
     for block, count, one, own, follows, table in each:
-        error = elastic * MODEL * np.sqrt(np.mean(block.values**2)) / one
+        error = MODEL * np.sqrt(np.mean(block.values**2)) / one
         misfit |= bool(np.sqrt(np.mean(follows**2)) > error)
         found = Noise(max(float(own @ own) * model.counts.sum() / count / freedom, LEAST_NOISE))
         white = found.variance
@@ -546,28 +527,3 @@ def _checked(
             why = "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold"
             notes.append(f"{why}; check the law, the angle, known constants, and the signs of columns")
     return wider.clip(1) * t.ppf(0.975, least) / t.ppf(0.975, freedom), notes
-
-
-def _reversed(model: Model, constants: dict[str, Any], names: Sequence[str], sums: np.ndarray) -> list[str]:
-    """Notes on components of fields that fit better if they are reversed, than by squares `sums` of each block."""
-    notes, begin = [], assumed(constants, [name for name in names if name in ASSUMED])
-    fields = any(block.places.ndim > 1 for block in model.blocks)
-    for component, signs in (("v", (1, -1)), ("u", (-1, 1))) if fields else ():
-        values = [block.by_place(block.values) * (signs if block.places.ndim > 1 else 1) for block in model.blocks]
-        turned = model.replaced(replace(block, values=one.ravel()) for block, one in zip(model.blocks, values))
-        found, tables, noise, _ = turned.fit(begin, names)
-        gain = 0.5 * np.log(sums / squares(tables, noise))
-        if model.counts @ gain > max(10, 0.03 * model.counts.sum()) and min(found.get(one, 0) for one in ASSUMED) >= 0:
-            notes.append(f"fields fit better with {component} reversed; change its sign, or let y run upwards")
-    return notes
-
-
-def _rubber(file: str | Path, law: str) -> Identified:
-    """Yeoh's law by `fit_rubber`, with the intervals of its least squares of relative errors."""
-    test = told(file)
-    material = fit_rubber(test, terms=3 if law == "yeoh" else 1)
-    weights, rows = relative_weights(test), stress_columns(test.stretch, len(material.coefficients))
-    block = Block(f"stress of '{file}'", test.stress * weights, weights, rows, rows[:, :0], None, test.stretch)
-    constants = {f"c{number}": value for number, value in enumerate(material.coefficients, 1)}
-    found = _identified(law, Model([(None, [block], 0.0)]), constants, list(constants), [])
-    return replace(found, materials={"": material})
