@@ -57,12 +57,11 @@ def test_any_box_is_covered_once(mesh_type, length, height, size):
 @pytest.mark.parametrize("mesh_type", ["structured", "right", "free"])
 def test_counts_are_the_same_in_every_unit(mesh_type):
     """Two cells and a half are a half in every unit: rounding took two or three."""
-    kind, counts, stretches = MESH_TYPES[mesh_type], set(), set()
+    kind, counts = MESH_TYPES[mesh_type], set()
     for unit in np.random.default_rng(1).uniform(1e-3, 1e3, 20):
         box = (7.5 * 0.1 * unit, 0.5 * unit, 0.3 * unit)
         counts.add(len(kind(*box).points))
-        stretches.add(round(kind.stretch(*(3 * 0.1 * unit, 0.1 * unit, 0.1 * unit)), 9))
-    assert len(counts) == len(stretches) == 1
+    assert len(counts) == 1
 
 
 def test_rows_are_equilateral_where_they_fit():

@@ -1,6 +1,5 @@
 """Delaunay triangulation inside an outline of imposed edge size: the mesh type ``free``."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -9,14 +8,6 @@ import numpy as np
 from .cells import Mesh, MeshError, signed_areas
 from .rows import ROW_HEIGHT
 from .types import check_box, mesh_type
-
-
-def _stretch(length: float, height: float, size: float) -> float:
-    """As of `MeshType.stretch`: the sides are divided, each by itself."""
-    # A hair less: a side of exactly n edges is not split into n + 1 by rounding.
-    along, across = (max(1, math.ceil(side / size * (1 - 1e-9))) for side in (length, height))
-    return length / along / (height / across)
-
 
 FITTING = 1.0 + 1e-9
 """Edge imposed on netgen, over the wanted one: a side of n edges exactly shall not be split into n + 1 by rounding."""
@@ -76,7 +67,7 @@ def upright(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.where((signed_areas(points, triangles) < 0)[:, None], triangles[:, ::-1], triangles)
 
 
-@mesh_type("free", order=20, row_height=ROW_HEIGHT, own_stretch=_stretch)
+@mesh_type("free", order=20, row_height=ROW_HEIGHT)
 def free(length: float, height: float, size: float) -> Mesh:
     """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
 

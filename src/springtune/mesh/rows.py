@@ -36,16 +36,12 @@ def isosceles(length: float, height: float, size: float, poisson_ratio: float) -
     of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper. `size` is a [m]; the number
     of rows is the nearest, that of cells along x keeps the shape best.
     """
-    return _fitted(length, height, *_isosceles_counts(length, height, size, poisson_ratio))
-
-
-def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: float) -> tuple[int, int]:
     check_box(length, height, size)
     if not (isinstance(poisson_ratio, Real) and 1e-6 <= poisson_ratio <= 1):
         raise MeshError(f"poisson_ratio: {poisson_ratio!r} has no such rows; give a number above 0 and at most 1")
     rows = nearest_whole(height / row_height(size, poisson_ratio))
     size = 2 * math.sqrt(poisson_ratio) * height / rows
-    return nearest_whole(length / size), rows
+    return _fitted(length, height, nearest_whole(length / size), rows)
 
 
 def row_height(size: float, poisson_ratio: float) -> float:
@@ -57,13 +53,8 @@ def _declare_isosceles(order: float, poisson_ratio: float) -> None:
     def made(length: float, height: float, size: float) -> Mesh:
         return isosceles(length, height, size, poisson_ratio)
 
-    def stretch(length: float, height: float, size: float) -> float:
-        cells, rows = _isosceles_counts(length, height, size, poisson_ratio)
-        return length / cells / (height / (shape * rows))
-
-    shape = row_height(1.0, poisson_ratio)
     made.__doc__ = f"Rows of triangles along x whose shape sets a Poisson's ratio of {poisson_ratio:g}."
-    mesh_type(f"isosceles-{poisson_ratio:g}", order=order, row_height=shape, own_stretch=stretch)(made)
+    mesh_type(f"isosceles-{poisson_ratio:g}", order=order, row_height=row_height(1.0, poisson_ratio))(made)
 
 
 _declare_isosceles(order=60, poisson_ratio=0.3)

@@ -65,13 +65,11 @@ Function = TypeVar("Function", bound=Callable[..., Mesh])
 class MeshType(Declared):
     """A mesh type of studies, made by the decorator `mesh_type`; call it to make a mesh.
 
-    `function` takes (length, height, size) [m]. `row_height` is over the mesh size [1]. `own_stretch`, with the same
-    arguments, replaces `stretch` if the counts are not the nearest.
+    `function` takes (length, height, size) [m]. `row_height` is over the mesh size [1].
     """
 
     corners: int = 3
     row_height: float = 1.0
-    own_stretch: Callable[[float, float, float], float] | None = None
 
     def __call__(self, length: float, height: float, size: float) -> Mesh:
         """Mesh a box; lengths in m."""
@@ -80,16 +78,6 @@ class MeshType(Declared):
             what = type(found).__name__
             raise MeshError(f"mesh type {self.name!r} returns {what}; return springtune.Mesh(points, triangles)")
         return found
-
-    def stretch(self, length: float, height: float, size: float) -> float:
-        """Return the cells' ratio of width to height over the nominal one, in a box [1]; lengths in m.
-
-        Known without making the mesh.
-        """
-        if self.own_stretch:
-            return self.own_stretch(length, height, size)
-        cells, rows = nearest_counts(length, height, size, self.row_height)
-        return length / cells / (height / (self.row_height * rows))
 
     def particles(self, length: float, height: float, size: float) -> float:
         """How many particles a mesh would have, about; parameters as of a call."""
@@ -113,7 +101,6 @@ def mesh_type(
     order: float = math.inf,
     corners: int = 3,
     row_height: float = 1.0,
-    own_stretch: Callable[[float, float, float], float] | None = None,
 ) -> Callable[[Function], Function]:
     """Declare a function as a mesh type, by a decorator that returns it unchanged.
 
@@ -123,7 +110,7 @@ def mesh_type(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels, between its neighbours' numbers; by default last.
-    corners, row_height, own_stretch
+    corners, row_height
         As of `MeshType`.
 
     Returns
@@ -156,7 +143,7 @@ def mesh_type(
             raise ValueError(f"mesh type {name!r}: corners {corners!r}; cells have 3 or 4")
         if not (isinstance(row_height, Real) and 0 < row_height < math.inf):
             raise ValueError(f"mesh type {name!r}: row_height {row_height!r} is not a number above zero; give one")
-        MESH_TYPES.declare(MeshType(name, function, order, corners, row_height, own_stretch))
+        MESH_TYPES.declare(MeshType(name, function, order, corners, row_height))
         return function
 
     return declare

@@ -59,19 +59,14 @@ LEFT_TO_GO = 1.5
 """Allowed rest of an error's way to its limit, over the rest of an error in proportion to the mesh size."""
 
 
-EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
-"""Cells across up to which every number of them is tried; steps by which they double beyond that; and numbers that are
-tried between two of these, where the coarsest mesh is."""
+EVERY_UP_TO, STEPS_A_DOUBLING = 16, 4
+"""Cells across up to which every number of them is tried; steps by which they double beyond that."""
 
-BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
-"""Sizes between whole divisions that an answer is tried on, over its own."""
+FINER = tuple(0.5 ** (step / 16) for step in range(1, 16))
+"""Finer sizes that an answer is tried on, over its own: cells are stretched between whole divisions."""
 
 FEWEST_CELLS = 4
 """Cells across a mesh above which errors change regularly with the mesh size."""
-
-FINER = tuple(0.5 ** (step / 120) for step in range(1, 120))
-"""Sizes over that of an answer. The two with the most stretched cells are tried, too; every fifth of them where the
-answer has less than `FEWEST_CELLS`."""
 
 ACROSS_DECIMALS = 3
 """Decimals of the cells across a mesh between whole divisions."""
@@ -164,7 +159,7 @@ class MeshChoice(Tabled):
     >>> best.size, best.cells, best.particles, best.confirmed
     (0.0231, 2, 31, True)
     >>> [finer.cells for finer in best.finer][:6]
-    [2.222, 2.447, 2.519, 2.856, 3, 3.174]
+    [2.277, 2.483, 2.593, 2.708, 3, 3.22]
     >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
     >>> print(f"{100 * best.choice.errors['bending']:+.3f} %, {100 * scene.solve().error:+.3f} %")
@@ -334,11 +329,9 @@ def find_mesh(
     Of each type meshes are solved from one cell across the beam's smaller side on, every number of cells up to 16 and
     four for each doubling beyond, until a definition has kept the error on all meshes from one of them on up to another
     that has at least twice as many cells across, and would keep it if it changed once more by as much as over the last
-    doubling. Then finer sizes between whole divisions are solved: .98, .95, .9, .83, .7 and .56 of the answer's; of a
-    beam the two down to half of it whose cells are stretched most; and 23 more where the answer has less than four
-    cells across. Where one of them does not keep the error, the search goes on to finer meshes. Beyond 16 cells meshes
-    between the answer and the next coarser one are tried, too, from the finer end. A definition is given up where its
-    error, by its change over the last doubling, will be too large on the finest mesh as well.
+    doubling. Then 15 finer sizes are solved, between the answer's and half of it. Where one of them does not keep the
+    error, the search goes on to finer meshes. A definition is given up where its error, by its change over the last
+    doubling, will be too large on the finest mesh as well.
 
     Meshes are ranked by their particles, and to the size of each error the error estimate of its reference is added.
     Errors that differ by less than that are equal: springs alone come first, then names. Kinematics are linear.
@@ -399,8 +392,7 @@ class _Family:
     """Meshes of a body that differ in their size.
 
     `side` is the smaller side of the body [m], which no mesh size exceeds; `one_cell` the mesh size of one cell across
-    it. From a mesh size [m] come about how many `particles`, `statements` on the mesh, and the `stretch` of its cells,
-    if it depends on the size.
+    it. From a mesh size [m] come about how many `particles`, and `statements` on the mesh.
     """
 
     name: str
@@ -408,7 +400,6 @@ class _Family:
     one_cell: float
     particles: Callable[[float], float]
     statements: Callable[[float], Sequence[Statement]]
-    stretch: Callable[[float], float] | None = None
 
 
 def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: str) -> _Family:
@@ -420,7 +411,6 @@ def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: s
         beam.height / make.row_height if beam.height <= beam.length else beam.length,
         partial(make.particles, *box),
         lambda size: beam_statements(beam, make(*box, size), material, loads),
-        partial(make.stretch, *box),
     )
 
 
@@ -486,31 +476,19 @@ class _Search:
         """The coarsest mesh with a definition that keeps the error on it and on finer ones; None without one."""
         for rung in (*self._rungs, None):
             names = [name for name in tried_names(self.solved, springs_alone) if self._promising(name)]
-            sure = self._settled(springs_alone)
+            sure = self._confirmed(springs_alone)
             if sure or rung is None or self._meshes and not names:
                 break
             self._solve(rung, names)
         start = sure or self._start(springs_alone, confirmed=False)
         return self._choice(*start, springs_alone, sure is not None) if start else None
 
-    def _settled(self, springs_alone: bool) -> tuple[int, list[str]] | None:
-        """As `_start`, with meshes tried between the answer and the next coarser one, and sizes between divisions."""
-        if (start := self._confirmed(springs_alone)) is None:
-            return None
-        upper, names = start
-        lower = max((rung for rung in self._rungs if rung < upper), default=upper)
-        for step in range(TRIED_BETWEEN, 0, -1):
-            cells = round(lower * (upper / lower) ** (step / (TRIED_BETWEEN + 1)))
-            if names and lower < cells < upper:
-                mesh = self._solve(cells, names)
-                names = [name for name in names if self._keeps(name, mesh)]
-        return self._confirmed(springs_alone)
-
     def _confirmed(self, springs_alone: bool) -> tuple[int, list[str]] | None:
         """As `_start`, with sizes between whole divisions tried."""
         while start := self._start(springs_alone):
             cells, names = start
-            for one in self._between(cells):
+            for part in FINER:
+                one = round(self.family.one_cell / (self._size(cells) * part), ACROSS_DECIMALS)
                 self._solve(one, names, whole=False)
                 if self._start(springs_alone) != start:
                     break  # it is not kept there: on to the next one
@@ -530,17 +508,6 @@ class _Search:
             if taken and (not confirmed or self._steady(name)):
                 starts.setdefault(taken[0], []).append(name)
         return min(starts.items()) if starts else None  # no two have the same cells
-
-    def _between(self, cells: int) -> list[float]:
-        """Cells across the meshes between whole divisions that an answer is tried on."""
-        size, stretch = self._size(cells), self.family.stretch
-        # Errors are irregular on few cells.
-        parts = [*BETWEEN_DIVISIONS, *(FINER[4::5] if cells < FEWEST_CELLS else ())]
-        if stretch is not None:
-            # Stretches that differ by rounding are one.
-            stretches = np.round([stretch(size * part) for part in FINER], 9)
-            parts += [FINER[np.argmin(stretches)], FINER[np.argmax(stretches)]]
-        return [round(self.family.one_cell / (size * part), ACROSS_DECIMALS) for part in parts]
 
     def _size(self, cells: float) -> float:
         """Mesh size [m] of so many cells across the smaller side, rounded up."""

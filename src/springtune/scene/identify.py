@@ -369,7 +369,7 @@ def identify(
     ('74 GPa', ('nu',))
     """
     constants_of_law = chosen(SHEET_LAWS, law, "law")
-    tests = list(tests) if isinstance(tests, list | tuple) else [tests]
+    tests = list(tests) if isinstance(tests, Sequence) else [tests]
     for test in tests:
         is_a(test, MeasuredTest, "tests", "springtune.MeasuredTest(beam, 'traction', 'pull.csv')")
     bodies = [stated(test) for test in tests]
