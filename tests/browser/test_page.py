@@ -28,7 +28,11 @@ def views(browser):
 
 def show(browser, view):
     browser.ask("location.hash = `#view=${arguments[0]}`", view)
-    browser.wait("return springtune.opened === arguments[0] && document.querySelector(`.view-${arguments[0]}`)", view)
+    browser.wait(
+        "return springtune.opened === arguments[0]"
+        " && document.querySelector(`.view-${arguments[0]}`)?.childElementCount",
+        view,
+    )
     browser.wait("return Promise.resolve(springtune.views[arguments[0]].plot?.drawn).then(() => true)", view)
 
 
@@ -339,9 +343,9 @@ class TestWhatIsSo:
         show(browser, "shape_fields")
         at_rest = browser.wait("return springtune.views.shape_fields.plot.chart.sources.lines?.data.xs[0]")
         assert at_rest == pytest.approx([0, 0.1, 0, None, 0.1, 0, 0.1])
-        network = browser.ask(
+        network = browser.wait(
             "const n = springtune.views.shape_fields.network.chart.sources;"
-            "return [n.springs.data.x0.length, n.outlines.data.xs.map((one) => one.length)]"
+            "return n.springs && [n.springs.data.x0.length, n.outlines.data.xs.map((one) => one.length)]"
         )
         assert network == [3, [7, 7]]  # both outlines: at rest, and of the reference
         assert "× 0.0" in text(browser, "#panel-network")

@@ -2,7 +2,7 @@
 
 Numbers are packed as float32 without the digits that the page never shows. An array with a long last dimension (a
 curve, a field) keeps only rows with values, as differences from point to point. Bytes are sorted by their place in a
-number, where they are alike, and each group is compressed as a whole. `assets/data.js` reads it.
+number, where they are alike, and each variable is compressed. `assets/data.js` reads it.
 """
 
 import base64
@@ -15,7 +15,6 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import asdict
 from importlib.util import find_spec
-from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +47,7 @@ def views() -> dict[str, View]:
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
     with reading.open(dataset) as tree, reading.guarded(dataset):
-        groups, contents = packed(tree)
+        groups = packed(tree)
     attributes = groups[0]["attributes"]
     declared = {path: asdict(view) for path, view in views().items()}
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
@@ -56,8 +55,6 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     library = _library()
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in SCRIPTS) + "})();\n"
-    blocks = {name: zlib.compress(text.encode(), 9) for name, text in texts.items()}
-    blocks |= {f"group-{number}": content for number, content in enumerate(contents)}
     # Scripts run only with one of these hashes, and nothing may be loaded: a script in a title stays a text.
     hashes = " ".join(_hash(text) for text in (script, *library.values()))
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
@@ -69,12 +66,16 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
         policy=f"{policy}; form-action 'none'",
         style=Markup(_asset("style.css")),
         script=Markup(script),
-        blocks={name: base64.b64encode(block).decode() for name, block in blocks.items()},
+        blocks={name: _deflated(text.encode()) for name, text in texts.items()},
     )
 
 
 def _asset(name: str) -> str:
     return (Path(__file__).parent / "assets" / name).read_text(encoding="utf-8")
+
+
+def _deflated(content: bytes) -> str:
+    return base64.b64encode(zlib.compress(content, 9)).decode()
 
 
 def _library() -> dict[str, str]:
@@ -101,55 +102,30 @@ CLEARED_OF_CELLS, CLEARED_OF_LINES = 6, 9
 ABSENT = -1
 """Number of an empty text."""
 
-ROOM = 3_200_000
-"""Most bytes of all numbers: the page with its library, in base64, stays below 5 MB."""
-
-Packed = tuple[dict[str, Any], list[bytes]]
-"""A group's description, and the bytes of each of its variables."""
+ROOM = 4_200_000
+"""Most characters of all numbers: the page with its library stays below 5 MB."""
 
 
-def packed(tree: xr.DataTree, room: int = ROOM) -> tuple[list[dict[str, Any]], list[bytes]]:
-    """Describe and pack the groups of a dataset."""
+def packed(tree: xr.DataTree, room: int = ROOM) -> list[dict[str, Any]]:
+    """Describe and pack the groups of a dataset; of a large one the largest variables are left out, and named."""
     root = tree.to_dataset()
-    found = [
-        _described(node.path, node.to_dataset(), set(map(str, node.to_dataset(inherit=False).variables)), root)
-        for node in tree.subtree
-        if node.path == "/" or node.to_dataset(inherit=False).variables
-    ]
-    contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
-    if sum(map(len, contents)) > room:
-        _lighten(found, room)
-        contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
-    for described, parts in found:
-        ends = list(accumulate(map(len, parts), initial=0))
-        for row, begin in zip(described["variables"], ends):
-            row["at"] = begin
-    return [described for described, _ in found], contents
-
-
-def _lighten(found: list[Packed], room: int) -> None:
-    """Leave out the largest variables until the rest fits; each group lists what is left out."""
-    sizes = [
-        (len(zlib.compress(part, 1)), number, row["name"])
-        for number, (described, parts) in enumerate(found)
-        for row, part in zip(described["variables"], parts)
-    ]
-    excess = sum(size for size, _, _ in sizes) - room
+    own = [(node, {*map(str, node.to_dataset(inherit=False).variables)}) for node in tree.subtree]
+    groups = [_described(node, names, root) for node, names in own if names or node.path == "/"]
+    rows = [(group, row) for group in groups for row in group["variables"]]
+    excess = sum(len(row["data"]) for _, row in rows) - room
     # Cells last: without them there is no table.
-    for size, number, name in sorted(sizes, key=lambda one: (one[1] == 0, -one[0])):
-        if excess <= 0:
-            break
-        described, parts = found[number]
-        place = [row["name"] for row in described["variables"]].index(name)
-        described["left_out"].append(name)
-        del described["variables"][place], parts[place]
-        excess -= size
+    for group, row in sorted(rows, key=lambda pair: (pair[0]["path"] == "/", -len(pair[1]["data"]))):
+        if excess > 0:
+            group["left_out"].append(row["name"])
+            group["variables"].remove(row)
+            excess -= len(row["data"])
+    return groups
 
 
-def _described(path: str, data: xr.Dataset, own: set[str], root: xr.Dataset) -> Packed:
+def _described(node: xr.DataTree, own: set[str], root: xr.Dataset) -> dict[str, Any]:
     """Describe and pack a group: its `own` variables, with labels that it may share with the group above."""
+    data = node.to_dataset()
     rows: list[dict[str, Any]] = []
-    parts: list[bytes] = []
     sizes: dict[Any, int] = {}
     for name, array in data.variables.items():
         if name not in own:
@@ -169,9 +145,7 @@ def _described(path: str, data: xr.Dataset, own: set[str], root: xr.Dataset) -> 
             row["error"] = True
             if _signed(row, values):
                 row |= {"signed": True, "sign": _sign(str(name), data, root)}
-        packed_as, content = _variable(values)
-        rows.append(row | packed_as)
-        parts.append(content)
+        rows.append(row | _variable(values))
     dims = []
     for name, size in sizes.items():
         dims.append({"name": name, "size": size})
@@ -181,7 +155,7 @@ def _described(path: str, data: xr.Dataset, own: set[str], root: xr.Dataset) -> 
                 **_words_on(data[name].variable),
             }
     attributes = {str(key): _plain(value) for key, value in data.attrs.items()}
-    return {"path": path, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}, parts
+    return {"path": node.path, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
 
 
 def _words_on(array: xr.Variable) -> dict[str, str]:
@@ -273,7 +247,7 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, bool | int | float | str) else str(value)
 
 
-def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
+def _variable(values: np.ndarray) -> dict[str, Any]:
     if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
         with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
             numbers = values.real.astype(np.float32)
@@ -288,8 +262,8 @@ def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
     return _rows({"type": "text", "words": words}, places, places != ABSENT)
 
 
-def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple[dict[str, Any], bytes]:
-    """Pack an array: how to read it, and its bytes."""
+def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
+    """Pack an array: its bytes, and how to read them."""
     long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
     points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
     numbers = values.reshape(-1, points)
@@ -313,7 +287,7 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
         bits = np.diff(bits, axis=1, prepend=np.int32(0))
     folded = (bits << 1) ^ (bits >> 31)
     parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
-    return row, b"".join(parts)
+    return row | {"data": _deflated(b"".join(parts))}
 
 
 def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:

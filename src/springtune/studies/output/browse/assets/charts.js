@@ -13,7 +13,7 @@ const MISSING = "#8883", FONT = "system-ui, sans-serif";
 const dark = matchMedia("(prefers-color-scheme: dark)");
 let libraryReady;
 function library() {
-  libraryReady ||= Promise.all(["bokeh", "bokeh-api"].map((id) => inflated(id).text())).then((texts) => {
+  libraryReady ||= Promise.all(["bokeh", "bokeh-api"].map((id) => inflated(document.getElementById(id).textContent).text())).then((texts) => {
     for (const text of texts) document.head.append(element("script", { text }));
     Bokeh.set_log_level("error");
     return Bokeh;

@@ -1,8 +1,8 @@
 "use strict";
 // The dataset as page.py packs it into this page.
 
-function inflated(id) {
-  const text = atob(document.getElementById(id).textContent), bytes = new Uint8Array(text.length);
+function inflated(packed) {
+  const text = atob(packed), bytes = new Uint8Array(text.length);
   for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")));
 }
@@ -36,11 +36,11 @@ class Field {
   }
 
   unpack() {
-    const { at, points } = this, { bytes } = this.group, rows = points ? this.size / points : 0;
-    const bitmap = "kept" in this ? Math.ceil(rows / 8) : 0, begin = at + bitmap;
+    const { points, bytes } = this, rows = points ? this.size / points : 0;
+    const bitmap = "kept" in this ? Math.ceil(rows / 8) : 0;
     const count = (bitmap ? this.kept : rows) * points, packed = new Int32Array(count);
     for (let i = 0; i < count; i++) {
-      const byte = (place) => bytes[begin + place * count + i] << (8 * place);
+      const byte = (place) => bytes[bitmap + place * count + i] << (8 * place);
       const folded = byte(0) | byte(1) | byte(2) | byte(3);
       packed[i] = (folded >>> 1) ^ -(folded & 1);
       if (i % points) packed[i] += packed[i - 1];
@@ -49,7 +49,7 @@ class Field {
     const numbers = isFloat ? new Float32Array(packed.map((one) => one << this.cleared).buffer) : packed;
     const whole = new numbers.constructor(this.size).fill(isFloat ? NaN : this.isText ? -1 : 0);
     for (let row = 0, from = 0; row < rows; row++) {
-      if (bitmap && !((bytes[at + (row >> 3)] >> (row & 7)) & 1)) continue;
+      if (bitmap && !((bytes[row >> 3] >> (row & 7)) & 1)) continue;
       whole.set(numbers.subarray(from, from + points), row * points);
       from += points;
     }
@@ -87,16 +87,15 @@ class Field {
 }
 
 class Group {
-  constructor(row, number) {
+  constructor(row) {
     Object.assign(this, row);
-    this.number = number;
     this.dims = Object.fromEntries(row.dims.map((dim) => [dim.name, dim]));
     this.fields = Object.fromEntries(row.variables.map((one) => [one.name, new Field(one, this)]));
     this.status = this.fields.status?.flags && this.fields.status.dims.length ? this.fields.status : null;
   }
 
   async load() {
-    this.bytes ||= new Uint8Array(await inflated(`group-${this.number}`).arrayBuffer());
+    for (const field of Object.values(this.fields)) field.bytes ||= new Uint8Array(await inflated(field.data).arrayBuffer());
     return this;
   }
 

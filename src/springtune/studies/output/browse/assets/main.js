@@ -68,7 +68,7 @@ class About {
 class Page {
   constructor(content) {
     Object.assign(this, content);
-    this.groups = Object.fromEntries(content.groups.map((row, i) => [row.path, new Group(row, i)]));
+    this.groups = Object.fromEntries(content.groups.map((row) => [row.path, new Group(row)]));
   }
 
   async start() {
@@ -144,7 +144,7 @@ class Page {
 }
 
 async function main() {
-  window.springtune = new Page(await inflated("content").json());
+  window.springtune = new Page(await inflated(document.getElementById("content").textContent).json());
   await window.springtune.start();
   document.documentElement.dataset.ready = "yes";
 }
