@@ -8,6 +8,7 @@ import os
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 from springtune.problem.geometry import AssumptionWarning
 from springtune.safe_io import atomic
@@ -20,13 +21,14 @@ from .store import DamagedError
 def main(tasks: str, record: str, digest: str, study: str) -> None:
     """Do the job of a note, and write its record."""
     warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
-    if not _is_note(tasks, digest):
+    note = _note(tasks, digest)
+    if not note:
         _plan(study, Path(tasks).parents[1])
-    if not _is_note(tasks, digest):
+        note = _note(tasks, digest)
+    if not note:
         raise SystemExit(f"{study} was changed while it ran; call the same command again")
     if os.environ.get(STATE, source_state()) != source_state():
         raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
-    note = read_note(Path(tasks))
     try:
         computed = in_worker(note["module"], note["content"])
     except DamagedError as error:
@@ -35,9 +37,10 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
     atomic.write_json(record, {"digest": digest, "computed": computed})
 
 
-def _is_note(tasks: str, digest: str) -> bool:
+def _note(tasks: str, digest: str) -> dict[str, Any]:
+    """Note of a job, empty if it is of another one."""
     note = read_note(Path(tasks))
-    return hash_of(note.get("module"), note.get("content")) == digest
+    return note if hash_of(note.get("module"), note.get("content")) == digest else {}
 
 
 def _plan(study: str, folder: Path) -> None:

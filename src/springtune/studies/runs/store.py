@@ -36,10 +36,6 @@ class DamagedError(Exception):
         return f"{self.args[0]}: {self.args[1]}; delete it, and call the same command again, which makes it anew"
 
 
-class OtherVersionError(DamagedError):
-    """A sound file of another version of springtune, which has none of the results that are asked for."""
-
-
 @contextmanager
 def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]]]]":
     """Context of a file, and its scalars."""
@@ -49,10 +45,7 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
         raise DamagedError(path, "it is missing")
     try:
         with h5py.File(path) as file:
-            content = file[SCALARS][()]
-            if not isinstance(content, np.ndarray):
-                raise OtherVersionError(path, "another version of springtune wrote it")
-            name, scalars = json.loads(content.tobytes())
+            name, scalars = json.loads(file[SCALARS][()].tobytes())
             if name != Path(path).name:
                 raise ValueError(f"it is {name}")
             yield file, scalars
@@ -65,11 +58,7 @@ def stored(path: str | Path) -> set[str]:
     """Keys of stored results."""
     if not Path(path).exists():
         return set()
-    try:
-        with _opened(path) as (_, scalars):
-            return set(scalars)
-    except OtherVersionError:
-        return set()
+    return set(everything(path))
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
