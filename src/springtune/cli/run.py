@@ -1,6 +1,7 @@
 """Run a study: check it, find outdated and damaged results, and call Snakemake."""
 
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -68,6 +69,10 @@ def run(most: int | None, results: Path | None, arguments: tuple[str, ...]) -> N
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
+    for place in map(str, (path, folder, source, sys.executable)):
+        if _wants_slurm(options) and not re.fullmatch(ON_SLURM, place):
+            why = "the plugin for Slurm passes paths to a shell without quotes"
+            raise click.UsageError(f"{place!r}: {why}; use letters, digits and @ + = : , . / _ - in its names")
     if results and folder != Path.cwd():
         click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
@@ -181,6 +186,9 @@ def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
         click.echo(f"{why}; {remedy}", err=True)
     return found if found or None not in each else None
 
+
+ON_SLURM = r"[\w@+=:,./-]*"
+"""Paths that a command for Slurm may contain."""
 
 SLURM = "snakemake_executor_plugin_slurm"
 """Package of the plugin; without it Snakemake only reports unknown options of the profile."""

@@ -49,7 +49,7 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
             if name != Path(path).name:
                 raise ValueError(f"it is {name}")
             yield file, scalars
-    except (OSError, RuntimeError, LookupError, ValueError) as error:
+    except (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError) as error:
         reason = str(error).strip("'\"").partition("\n")[0]
         raise DamagedError(path, f"it is damaged ({reason})") from None
 
