@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from springtune.reference.interpolant import TOLERANCE
-from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes import any_reference, reference
+from springtune.studies.kinds.scenes import any_reference, collect, reference
 from springtune.studies.kinds.scenes.kind import summary
 from springtune.studies.kinds.scenes.plan import (
     box_of,
@@ -104,11 +103,11 @@ def test_boxes_hold_what_they_are_made_of():
 def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):
     study = load(lengths(MANY))
     do_stages(study, tmp_path / "results", "reference", "mesh", "solve")
-    root = kinds()[0].module("collect").groups(study, tmp_path / "results")["/"]
+    root = collect.groups(study, tmp_path / "results")["/"]
     # Two of them, in a study of their own.
     few = load({number: lengths(MANY)[number] for number in (3, 17)})
     do_stages(few, tmp_path / "few", "reference", "mesh", "solve")
-    alone = kinds()[0].module("collect").groups(few, tmp_path / "few")["/"]
+    alone = collect.groups(few, tmp_path / "few")["/"]
     for name in ("reference_displacement", "deformation_error"):
         there = root[name].sel(beam=alone.beam).squeeze()
         sure = float(root.reference_error_estimate.max() + alone.reference_error_estimate.max())

@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from springtune.registry import imported
@@ -189,15 +188,6 @@ class Kind:
     def wanted(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""
         return not self.study_fields or any(getattr(config, key) for key in self.study_fields)
-
-    def place(self, name: str) -> str:
-        """Name of a module of its package."""
-        return f"studies.kinds.{self.name}.{name}"
-
-    def module(self, name: str) -> ModuleType:
-        """A module of its package."""
-        found: ModuleType = imported(self.place(name))
-        return found
 
 
 def stem(name: str, selection: Mapping[str, str]) -> str:

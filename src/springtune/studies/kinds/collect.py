@@ -1,6 +1,7 @@
 """Compare what was solved with its references and gather everything in one dataset."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,7 +62,8 @@ def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:
-            groups |= _of_tasks(kind, study, folder) if kind.variables else kind.module("collect").groups(study, folder)
+            own = partial(_of_tasks, kind) if kind.variables else imported(f"studies.kinds.{kind.name}.collect:groups")
+            groups |= own(study, folder)
     for made in outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= imported(made.collect).groups(study, folder)

@@ -13,7 +13,7 @@ from springtune.reference.calculix import program
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
+from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind, Stage
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -53,7 +53,7 @@ class BenchmarkConfig(Section):
     definition: fields.DefinitionNames
     """Definitions that derive a stiffness and need no reference."""
 
-    mesh_type: OneOrMore[fields.MeshType]
+    mesh_type: OneOrMore[fields.MadeType]
     """Mesh types of the definitions."""
 
     approach: OneOrMore[OtherApproach] = Field(list(OTHER_APPROACHES))
@@ -84,18 +84,15 @@ def _check(config, problems):
     labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
     check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
     for beam in dict.fromkeys(scene.beam for scene in section.scenes.values()):
-        if beam in config.beams:
-            extent, largest = (config.beams[beam].length, config.beams[beam].height), max(section.mesh_size)
-            check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
-            if largest > min(extent) / 2:
-                message = f"{1e3 * largest:g} mm is too large for '{beam}'; give at most {500 * min(extent):g} mm"
-                problems.add(("benchmark", "mesh_size"), message)
+        extent, largest = (config.beams[beam].length, config.beams[beam].height), max(section.mesh_size)
+        check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
+        if largest > min(extent) / 2:
+            message = f"{1e3 * largest:g} mm is too large for '{beam}'; give at most {500 * min(extent):g} mm"
+            problems.add(("benchmark", "mesh_size"), message)
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)
         check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
     check_able(problems, ("benchmark", "definition"), section.definition)
-    for name in section.mesh_type:
-        check_known(problems, ("benchmark", "mesh_type"), "mesh type", name, MESH_TYPES, None)
     approaches = approach_names(section.definition, section.mesh_type, section.approach)
     for name in section.finest_of:
         if name not in approaches:

@@ -126,10 +126,9 @@ def _check(config, problems):
     for name, scene in section.scenes.items():
         place, why = ("engines", "scenes", name), "turns with its side, and forces in engines do not"
         checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
-        if beam := config.beams.get(scene.beam):
-            made, size = MESH_TYPES[scene.mesh_type], scene.mesh_size
-            if refusal := made.refusal(beam.length, beam.height, size, f"beam '{scene.beam}'"):
-                problems.add((*place, "mesh_size"), f"{checks.in_mm(size)} {refusal}")
+        beam, size = config.beams[scene.beam], scene.mesh_size
+        if refusal := MESH_TYPES[scene.mesh_type].refusal(beam.length, beam.height, size, f"beam '{scene.beam}'"):
+            problems.add((*place, "mesh_size"), f"{checks.in_mm(size)} {refusal}")
     for name, runs in section.runs.items():
         place = "engines", "runs", name
         for engine in runs.engine:

@@ -94,11 +94,9 @@ def _check(config, problems):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
     check_able(problems, ("laying", "definition"), config.laying.definition, ["structured"])
     check_product(problems, config.laying, ("laying",), OF_STRIP, MOST_STRIPS)
-    if config.laying.strip in config.beams:
-        beam = config.beams[config.laying.strip]
-        check_particles(problems, ("laying", "mesh_size"), config.laying.mesh_size, beam.length, beam.height)
-        finest = [config.laying.reference_size]
-        check_particles(problems, ("laying", "reference_size"), finest, beam.length, beam.height)
+    beam = config.beams[config.laying.strip]
+    for key, sizes in (("mesh_size", config.laying.mesh_size), ("reference_size", [config.laying.reference_size])):
+        check_particles(problems, ("laying", key), sizes, beam.length, beam.height)
     base = config.laying.trapezoid
     if not base.upper_base < base.lower_base:
         problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")

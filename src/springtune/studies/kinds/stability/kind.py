@@ -57,13 +57,11 @@ def _check(config, problems):
     if section.mesh_type not in made:
         message = f"'{section.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
         problems.add(("stability", "mesh_type"), message)
-    if section.beam in config.beams:
-        beam = config.beams[section.beam]
-        check_particles(problems, ("stability", "mesh_size"), section.mesh_size, beam.length, beam.height)
-        side = min(beam.length, beam.height)
-        if max(section.mesh_size) > 0.3 * side:
-            message = f"{1e3 * max(section.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
-            problems.add(("stability", "mesh_size"), message)
+    extent = config.beams[section.beam].length, config.beams[section.beam].height
+    check_particles(problems, ("stability", "mesh_size"), section.mesh_size, *extent)
+    if (largest := max(section.mesh_size)) > 0.3 * min(extent):
+        message = f"{1e3 * largest:g} mm leaves few particles inside; give at most {300 * min(extent):g} mm"
+        problems.add(("stability", "mesh_size"), message)
 
 
 def _expand(config, declared):
