@@ -13,6 +13,7 @@ Scenes depend on seed and number alone.
 
 import copy
 import math
+import warnings
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 
@@ -39,11 +40,13 @@ from mechanics import (
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import FollowerPressure
 from springtune.mesh import MESH_TYPES
+from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.scene.sheet import Loading, Sheet, solved
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.studies.kinds.scenes.solve import solved as solve_scene
+from springtune.studies.kinds.bodies.solve import solve as solve_scene
+from springtune.studies.kinds.bodies.solve import solve_beam
 
 PROMISED = 1e-6
 """Largest error of the displacements of a solved scene, relative: `springtune.mechanics.newton.CORRECTION`."""
@@ -344,10 +347,13 @@ def audit(scene, path=True):
         force = (body.critical(guess, judge) or guess / 1.6) * scene.level
     task = {
         "material": asdict(scene.material), "kind": load.kind.name, "follower": load.follower, "force": float(force),
-        "definition": scene.definition, "kinematics": scene.kinematics, "reference": None, "stiffness": stiffness,
+        "definition": scene.definition, "kinematics": scene.kinematics, "stiffness": stiffness,
         "keep_fields": True,
     }  # fmt: skip
-    result = solve_scene(Sheet(mesh, scene.thickness), task)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssumptionWarning)  # thick ones are drawn, too
+        beam = Beam(scene.length, scene.height, scene.thickness)
+    result = solve_scene(task, partial(solve_beam, beam, Sheet(mesh, scene.thickness), None))
     if str(result["status"]) != "solved":
         return []
     check = check_linear if scene.kinematics == "linear" else partial(check_nonlinear, mesh, masses, path)

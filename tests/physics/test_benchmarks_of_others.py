@@ -30,14 +30,14 @@ def study():
 
 @cache
 def mesh(shape, size):
-    part = study().parts["shapes"]
+    part = study().shapes
     refined = {name: factor * size for name, factor in dict(part.refined.get(shape, {})).items()}
     return st.mesh_shape(part.shape[shape], size, refined=refined)
 
 
 @cache
 def result(shape, load, size, definition):
-    part = study().parts["shapes"]
+    part = study().shapes
     wanted = {one.material for one in part.scenes if one.shape == shape}
     material = part.materials_of(shape, *wanted)[""]
     return st.Scene(
@@ -64,7 +64,7 @@ def told(cell):
 
 
 def kind(shape, load, quantity):
-    asked = study().parts["shapes"].shape[shape].loads[load].quantities
+    asked = study().shapes.shape[shape].loads[load].quantities
     return next(one.kind for one in asked if one.name == quantity)
 
 
@@ -78,7 +78,7 @@ def kind(shape, load, quantity):
 )
 def test_errors_on_the_finest_mesh_are_those_of_the_page(row):
     shape, load, quantity = place(row[0])
-    sizes = [one.mesh_size for one in study().parts["shapes"].scenes if one.shape == shape]
+    sizes = [one.mesh_size for one in study().shapes.scenes if one.shape == shape]
     size = told(row[3].removesuffix(" mm")) / 1e3
     assert size == pytest.approx(min(sizes))
     assert len(mesh(shape, min(sizes)).mesh.points) == told(row[4].replace(",", ""))

@@ -6,7 +6,7 @@ import pytest
 
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
-from springtune.studies.kinds.scenes import plan as scenes
+from springtune.studies.kinds.bodies import plan as scenes
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import attempts, job, rerun

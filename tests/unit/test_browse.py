@@ -105,14 +105,22 @@ class TestPage:
     def test_views_name_variables_that_studies_have(self):
         """A plot whose variable is misspelt would be left out silently."""
         from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
+        from springtune.studies.kinds.bodies.variables import (
+            AT_FINITE_STRAIN,
+            BLOCK,
+            FIELDS,
+            FINITE_STRAIN,
+            ROOT,
+            SENSITIVITY,
+            SHAPE_FIELDS,
+            SHAPES,
+        )
         from springtune.studies.kinds.collect import group_of
         from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
         from springtune.studies.kinds.laying.kind import KIND as LAYING
         from springtune.studies.kinds.moduli.kind import KIND as MODULI
         from springtune.studies.kinds.samples.collect import SAMPLES, SOBOL
         from springtune.studies.kinds.samples.designs import PARAMETERS
-        from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
-        from springtune.studies.kinds.shapes.collect import AT_FINITE_STRAIN, SHAPE_FIELDS, SHAPES
         from springtune.studies.kinds.stability.kind import KIND as STABILITY
         from springtune.studies.output.browse.page import views
 

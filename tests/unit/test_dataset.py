@@ -20,8 +20,8 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 from springtune.studies.config.kind import modules
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes.tables import tables
-from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.tables import tables
+from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK, Group
 from springtune.studies.output.reading import lazily

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
+from springtune.studies.kinds.bodies.plan import OF_OTHERS
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
@@ -53,8 +54,8 @@ def test_a_closure_is_all_that_is_imported_and_what_only_others_import_is_not_in
     names = {path.relative_to(keys.PACKAGE).as_posix() for path in keys.closure("springs.lattice").files}
     assert {"springs/lattice.py", "springs/base.py", "mesh/cells.py"} <= names
     assert not {name for name in names if name.startswith(("studies/", "reference/", "mesh/free"))}
-    whole = keys.closure("studies.kinds.scenes.reference")
-    less = keys.closure("studies.kinds.scenes.reference", without=("reference.finite_strain",))
+    whole = keys.closure("studies.kinds.bodies.reference")
+    less = keys.closure("studies.kinds.bodies.reference", without=("reference.finite_strain",))
     gone = {path.name for path in whole.files - less.files}
     assert "finite_strain.py" in gone and whole.digest != less.digest
 
@@ -116,9 +117,10 @@ def forget():
 def _keys():
     forget()
     found = {stage.module.removeprefix("studies.kinds."): keys.stage_key(stage.module) for stage in stages()}
-    found["unit"] = keys.stage_key(
-        "studies.kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant")
-    )
+    of_beams = ("studies.kinds.bodies.shape_reference", "reference.finite_strain", "reference.interpolant")
+    found["unit"] = keys.stage_key("studies.kinds.bodies.reference", without=of_beams)
+    found["box"] = keys.stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.shape_mesh",))
+    found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=OF_OTHERS)
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
     return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}
 
@@ -129,19 +131,19 @@ def known():
     return _keys()
 
 
-KINDS = ("moduli", "laying", "stability", "benchmark", "samples", "shapes", "engines")
-SOLVING = {"scenes.solve", "scenes.sensitivity", "patch", "annealed", *(f"{name}.solve" for name in KINDS)}
-REFERENCE = {"scenes.reference", "samples.interpolate", "shapes.reference", "unit"}
+KINDS = ("bodies", "moduli", "laying", "stability", "benchmark", "samples", "engines")
+SOLVING = {"beam", "bodies.sensitivity", "patch", "annealed", *(f"{name}.solve" for name in KINDS)}
+REFERENCE = {"bodies.reference", "samples.interpolate", "unit"}
 
 VERSIONS = {
     **dict.fromkeys(("matplotlib", "xarray", "h5py", "pint", "pydantic", "snakemake"), set()),
-    "netgen-mesher": {"free", "shapes.mesh", "shapes.reference", "shapes.solve", "engines.solve"},
+    "netgen-mesher": {"free", "bodies.mesh", "bodies.reference", "bodies.solve", "engines.solve"},
     "meshio": {"from a file"},
-    "numba": {"stability.solve", "benchmark.solve", "shapes.solve", "engines.solve"},
-    "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.reference", "shapes.solve", "engines.solve"},
+    "numba": {"stability.solve", "benchmark.solve", "engines.solve"},
+    "scikit-fem": {"bodies.reference", "benchmark.solve", "bodies.solve", "engines.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"scenes.mesh", "scenes.calibrate", "shapes.mesh", "from a file", "lattice"},
+    "scipy": SOLVING | REFERENCE | {"bodies.mesh", "box", "bodies.calibrate", "from a file", "lattice"},
 }
 
 
@@ -180,7 +182,7 @@ def test_of_pythons_version_what_is_before_the_patch_level_counts(monkeypatch):
     def key(*version):
         forget()
         monkeypatch.setattr(sys, "version_info", version)
-        return keys.stage_key("studies.kinds.scenes.mesh")
+        return keys.stage_key("studies.kinds.bodies.mesh")
 
     here = key(major, minor, patch)
     assert key(major, minor, patch + 1) == here

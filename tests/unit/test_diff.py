@@ -9,7 +9,7 @@ import xarray as xr
 
 import springtune as st
 from springtune.studies.kinds.benchmark.kind import VARIABLES
-from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare
 

@@ -17,9 +17,9 @@ from PIL import Image
 
 import springtune as st
 from springtune.studies.config.kind import FORMATS, Output, outputs
+from springtune.studies.kinds.bodies import errors, figures
+from springtune.studies.kinds.bodies.figures import draw_curve
 from springtune.studies.kinds.moduli.figures import definitions
-from springtune.studies.kinds.scenes import errors, figures
-from springtune.studies.kinds.scenes.figures import draw_curve
 from springtune.studies.output import present, style
 from springtune.studies.output.drawing import NETWORK_LINE
 from springtune.studies.output.style import png_and_pdf
@@ -386,10 +386,10 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
         files = closure("studies.output.present", output.module).files
-        return {path.parent.name for path in files if path.name in ("figures.py", "errors.py")}
+        return {path.parent.name for path in files if path.name.endswith(("figures.py", "errors.py"))}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
-    assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}
+    assert kinds["sensitivity"] == kinds["block"] == {"bodies"} and kinds["definitions"] == {"moduli"}
     assert all(len(found) == 1 for found in kinds.values())
 
 

@@ -293,7 +293,7 @@ def test_what_is_shown_is_of_each_beam_material_and_load(swept):
 
 
 def test_tables_have_a_row_of_each_value(swept):
-    from springtune.studies.kinds.scenes.tables import tables
+    from springtune.studies.kinds.bodies.tables import tables
 
     tree, _, _ = swept
     (table,) = tables(tree)
@@ -361,7 +361,7 @@ def test_who_needs_a_field_has_it_whoever_asks_first(here):
 
 def test_what_is_interpolated_is_no_part_of_what_a_network_depends_on(here):
     """Another range of Poisson's ratio is another interpolant, and the same networks."""
-    from springtune.studies.kinds.scenes.plan import scene_tasks
+    from springtune.studies.kinds.bodies.plan import scene_tasks
 
     keys = []
     for last, points in (("0.4", "61"), ("0.45", "71")):

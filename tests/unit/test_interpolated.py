@@ -5,9 +5,9 @@ import pytest
 
 from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes import any_reference, collect, reference
-from springtune.studies.kinds.scenes.kind import summary
-from springtune.studies.kinds.scenes.plan import (
+from springtune.studies.kinds.bodies import any_reference, collect, reference
+from springtune.studies.kinds.bodies.kind import summary
+from springtune.studies.kinds.bodies.plan import (
     box_of,
     expected_solves,
     interpolants,

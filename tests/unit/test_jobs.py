@@ -12,6 +12,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from springtune.studies.kinds.bodies.plan import OF_OTHERS
 from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
 from springtune.studies.runs.source import STATE, hash_of, source_state
@@ -220,10 +221,11 @@ def test_keys_are_those_that_results_were_stored_under():
 
 
 def test_stages_depend_on_what_they_import_and_on_nothing_else():
-    solve, mesh = (
-        {path.relative_to(code.PACKAGE).as_posix() for path in code.closure(f"studies.kinds.scenes.{stage}").files}
-        for stage in ("solve", "mesh")
-    )
+    def files(stage, *others):
+        found = code.closure(f"studies.kinds.bodies.{stage}", without=others).files
+        return {path.relative_to(code.PACKAGE).as_posix() for path in found}
+
+    solve, mesh = files("solve", *OF_OTHERS), files("mesh", "studies.kinds.bodies.shape_mesh")
     assert {"mechanics/network.py", "mechanics/statics.py", "springs/lattice.py", "mesh/cells.py"} <= solve
     assert not {"mesh/free.py", "mesh/rows.py"} & solve  # these count with the meshes that they make
     assert "studies/runs/store.py" in solve
@@ -238,7 +240,7 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     assert "mechanics/statics.py" not in mesh
     # References know the mesh of a network by its type alone, so an edit of a mesh does not solve them again. The sides
     # of outlines are geometry, which load cases are on.
-    reference = code.closure("studies.kinds.scenes.reference").files
+    reference = code.closure("studies.kinds.bodies.reference", without=("studies.kinds.bodies.shape_reference",)).files
     assert {path.name for path in reference if path.parent.name == "mesh"} <= {"sides.py"}
     assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again
 
@@ -247,4 +249,4 @@ def test_definitions_belong_to_their_own_keys_and_to_no_stage():
     # An edit of one definition is to solve that definition's scenes again and no others.
     digests = {name: code.definition_closure(name).digest for name in ("angular", "delingette", "patch", "lattice")}
     assert len(set(digests.values())) == len(digests)
-    assert code.PACKAGE / "springs/angular.py" not in code.closure("studies.kinds.scenes.solve").files
+    assert code.PACKAGE / "springs/angular.py" not in code.closure("studies.kinds.bodies.solve").files

@@ -25,7 +25,7 @@ from springtune.mesh import (
     write_mesh,
 )
 from springtune.safe_io.inputs import virtual_memory
-from springtune.studies.kinds.scenes.mesh import make
+from springtune.studies.kinds.bodies.mesh import make
 
 boxes = {
     "length": st.floats(0.02, 0.3),

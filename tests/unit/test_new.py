@@ -84,7 +84,7 @@ class TestNew:
         text = Path("config/my-plate.yaml").read_text()
         assert max(map(len, text.splitlines())) <= 120
         study = load_study("config/my-plate.yaml")
-        assert len(study.parts["shapes"].scenes) == 4 and study.title == "My plate"
+        assert len(study.shapes.scenes) == 4 and study.title == "My plate"
         # What the comments offer may be put in.
         Path("config/pressed.yaml").write_text(text.replace("# pressures:", "pressures:"))
         assert load_study("config/pressed.yaml").shape("plate").loads["pull"].pressures[0].pressure == 1e6

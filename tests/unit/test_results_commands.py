@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset, scene_files
 
 from synthetic import dataset as every

@@ -11,9 +11,9 @@ import pytest
 
 import springtune as st
 from springtune.problem.materials import material_of
+from springtune.studies.kinds.bodies import plan
+from springtune.studies.kinds.bodies.errors import like_with_like
 from springtune.studies.kinds.moduli.figures import decision
-from springtune.studies.kinds.scenes import plan
-from springtune.studies.kinds.scenes.errors import like_with_like
 from springtune.studies.runs.keys import material_key
 from springtune.studies.runs.provenance import inputs
 

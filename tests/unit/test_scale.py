@@ -12,7 +12,7 @@ import yaml
 
 from counting import counted
 from springtune.studies.kinds import collect, load_study
-from springtune.studies.kinds.scenes import plan as scenes
+from springtune.studies.kinds.bodies import plan as scenes
 from springtune.studies.output import page
 from springtune.studies.runs import rerun, store
 

@@ -2,16 +2,16 @@
 
 import time
 from dataclasses import asdict
+from functools import partial
 
 import numpy as np
 import pytest
 
 import springtune as st
-from springtune.mesh import MESH_TYPES
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
-from springtune.studies.kinds.scenes.solve import solved
+from springtune.studies.kinds.bodies.solve import solve, solve_beam
 from springtune.studies.output.dataset import STATUS
 
 from tables import refused_objects
@@ -166,16 +166,17 @@ MATERIAL = asdict(Material(210e9, 0.3, name="steel"))
 
 def task_of(definition, kinematics):
     return {"key": "", "material": MATERIAL, "kind": "axial", "follower": False, "force": 1e3, "definition": definition,
-            "kinematics": kinematics, "reference": {}}  # fmt: skip
+            "kinematics": kinematics}  # fmt: skip
 
 
 def test_the_time_of_a_definition_is_taken_off_the_scene_that_spent_it_alone():
     """Scenes that share springs used to lose seconds that none of them had spent, down to below zero."""
-    sheet = Sheet(MESH_TYPES["structured"](0.05, 0.02, 5e-3), 1e-3)
+    beam = st.Beam(0.05, 0.02)
+    sheet = Sheet(st.make_mesh(beam, "structured", 5e-3), beam.thickness)
     results, deriving = [], []
     for kinematics in ("linear", "nonlinear", "linear"):
         before, begin = sheet.deriving, time.perf_counter()
-        results.append(solved(sheet, task_of("adjoint", kinematics)))
+        results.append(solve(task_of("adjoint", kinematics), partial(solve_beam, beam, sheet, None)))
         elapsed = time.perf_counter() - begin
         deriving.append(sheet.deriving - before)
         assert results[-1]["status"] == Status.SOLVED

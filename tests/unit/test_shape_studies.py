@@ -14,13 +14,12 @@ from springtune.cli import main
 from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
+from springtune.studies.kinds.bodies import mesh, stored
+from springtune.studies.kinds.bodies.expand import READ_AT_ONCE
+from springtune.studies.kinds.bodies.shape_plan import mesh_key, reference_task, scene_task
+from springtune.studies.kinds.bodies.task_values import ONE_LOAD, geometry, named, shape_of
+from springtune.studies.kinds.bodies.task_values import load as values_of
 from springtune.studies.kinds.moduli.figures import definitions
-from springtune.studies.kinds.scenes import stored
-from springtune.studies.kinds.shapes import mesh
-from springtune.studies.kinds.shapes.expand import READ_AT_ONCE
-from springtune.studies.kinds.shapes.kind import mesh_key, reference_task, scene_task
-from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, named, shape_of
-from springtune.studies.kinds.shapes.task_values import load as values_of
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
@@ -54,7 +53,7 @@ def scenes(study, folder):
 
 def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
     text = "title: nothing\nmaterials: {one: {young_modulus: 1 MPa, poisson_ratio: 0.3}}\n"
-    others = "or 'laying', 'stability', 'benchmark', 'samples', 'shape_grids', 'engines'"
+    others = "or 'shape_grids', 'laying', 'stability', 'benchmark', 'samples', 'engines'"
     assert f"'grids' is missing; give a section for each grid, by name, {others}" in refusal(text)
 
 
@@ -62,29 +61,29 @@ def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
 
 
 def test_scenes_are_in_one_order_and_each_once(load):
-    one = load(COOK).parts["shapes"]
+    one = load(COOK).shapes
     again = "  again: {shape: cook, mesh_size: 8 mm, material: third, definition: [lattice], kinematics: linear}\n"
-    two = load(COOK.replace("[16 mm, 8 mm]", "[8 mm, 16 mm]") + again, "other.yaml").parts["shapes"]
+    two = load(COOK.replace("[16 mm, 8 mm]", "[8 mm, 16 mm]") + again, "other.yaml").shapes
     assert one.scenes == two.scenes and len(one.scenes) == 4
     assert [(scene.mesh_size, scene.definition) for scene in one.scenes] == [
         (8e-3, "lattice"), (8e-3, "delingette"), (16e-3, "lattice"), (16e-3, "delingette"),
     ]  # fmt: skip
     assert one.referred == (("cook", "third", "shear"),)
-    without = load(COOK.replace("kinematics: linear", "reference: false"), "without.yaml").parts["shapes"]
+    without = load(COOK.replace("kinematics: linear", "reference: false"), "without.yaml").shapes
     assert not without.referred and without.scenes[0].kinematics == "nonlinear"
 
 
 def test_keys_know_no_labels(load):
     """A quantity that is renamed, or of which another value is expected, a load, a shape: nothing is solved again."""
-    one = load(COOK).parts["shapes"]
+    one = load(COOK).shapes
     text = COOK.replace("cook", "panel").replace("shear:", "other:").replace("third", "soft")
     text = text.replace("tip: {displacement", "end: {displacement").replace("23.96 mm, source: somebody", "24 mm")
-    two = load(text, "two.yaml").parts["shapes"]
+    two = load(text, "two.yaml").shapes
     for first, second in zip(one.scenes, two.scenes):
         assert mesh_key(one, first) == mesh_key(two, second)
         assert scene_task(one, first)["key"] == scene_task(two, second)["key"]
     assert reference_task(one, "cook", "third", "shear")["key"] == reference_task(two, "panel", "soft", "other")["key"]
-    stiffer = load(COOK.replace("1 MPa", "2 MPa"), "stiffer.yaml").parts["shapes"]
+    stiffer = load(COOK.replace("1 MPa", "2 MPa"), "stiffer.yaml").shapes
     assert mesh_key(one, one.scenes[0]) == mesh_key(stiffer, stiffer.scenes[0])
     assert scene_task(one, one.scenes[0])["key"] != scene_task(stiffer, stiffer.scenes[0])["key"]
 
@@ -174,7 +173,7 @@ def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
     made = {name for name in page.write(tree, tmp_path) if name != "index.html"}
     assert made | {"index.html"} == {Path(name).name for name in output_files(outputs()["tables"], study)}
     rows = (tmp_path / "shapes.csv").read_text().splitlines()
-    assert len(rows) == 1 + 2 * len(study.parts["shapes"].scenes)
+    assert len(rows) == 1 + 2 * len(study.shapes.scenes)
     assert "Sources: cook, tip: somebody." in (tmp_path / "index.html").read_text()
 
 
@@ -222,17 +221,17 @@ def plate(tmp_path):
 
 def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     study = load(yaml.safe_dump(PLATE))
-    assert study.parts["shapes"].scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
+    assert study.shapes.scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
     cell = scenes(study, tmp_path / "results/study")
     assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
     assert abs(float(cell.error)) < 0.01
     # The file is part of the keys, its place is not.
-    part = study.parts["shapes"]
+    part = study.shapes
     before = mesh_key(part, part.scenes[0])
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "plate.vtu").rename(tmp_path / "elsewhere/plate.vtu")
     moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.vtu"}}}
-    part = load(yaml.safe_dump(moved), "moved.yaml").parts["shapes"]
+    part = load(yaml.safe_dump(moved), "moved.yaml").shapes
     assert mesh_key(part, part.scenes[0]) == before
     write_mesh(tmp_path / "elsewhere/plate.vtu", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
     assert mesh_key(part, part.scenes[0]) != before
@@ -387,7 +386,7 @@ def test_references_are_told_apart_whatever_they_are_called(load, tmp_path):
     pairs = {"one": ("a", "b_c"), "other": ("a_b", "c")}
     content["shape_grids"] = {name: grid | {"shape": a, "material": b} for name, (a, b) in pairs.items()}
     jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results").values()
-    files = [file for job in jobs if job.stage.name == "shape_reference" for file in job.content["files"]]
+    files = [file for job in jobs if job.stage.name == "reference" for file in job.content["files"]]
     assert len({task["key"] for file in files for task in file["tasks"]}) == 2
 
 
@@ -400,13 +399,13 @@ def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
     asked = dict.fromkeys((job.stage.name for job in made), 0)
     for job in made:
         asked[job.stage.name] += len(job.results)
-    assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
+    assert asked == {"reference": 1, "mesh": 2, "solve": 4}
 
 
 def test_scenes_whose_mesh_could_not_be_made_are_holes_that_say_why(load, tmp_path):
     study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study").values()}
-    mesh.run(jobs["shape_mesh"].content, Attempts({"shape_cook_free_16mm": "it died"}))
+    mesh.run(jobs["mesh"].content, Attempts({"shape_cook_free_16mm": "it died"}))
     tree, told = done(study, tmp_path / "results/study")
     assert "2 failed" in told and set(tree["shapes"].message.values.ravel()) == {"mesh: it died"}
 
@@ -437,7 +436,7 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
     grid |= {"definition": ["neo-hooke", "delingette", "lattice"], "kinematics": ["nonlinear", "linear"]}
     grid |= {"mesh_size": "8 mm", "finite_strain": True}
     study = load(yaml.safe_dump(config, sort_keys=False))
-    laws = [law for *_, law in study.parts["shapes"].finite]
+    laws = [law for *_, law in study.shapes.finite]
     assert laws == ["st-venant", "rubber"] * 2  # as definitions are ordered
     tree, _ = done(study, tmp_path / "results/study")
     finite, data = tree["shapes_finite_strain"].to_dataset(), tree["shapes"].to_dataset()

@@ -66,8 +66,8 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
 def test_static_stages_know_no_dynamics():
     """A static scene assembles no masses: its stage does not even import them, and density is in none of its keys."""
     for stage in (
-        "studies.kinds.scenes.solve",
-        "studies.kinds.scenes.sensitivity",
+        "studies.kinds.bodies.solve",
+        "studies.kinds.bodies.sensitivity",
         "studies.kinds.moduli.solve",
         "studies.kinds.laying.solve",
     ):

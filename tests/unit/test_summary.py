@@ -17,7 +17,7 @@ from snakemake_logger_plugin_springtune import Display, LogHandler
 from springtune.problem.status import Status
 from springtune.safe_io import atomic
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import rerun
 

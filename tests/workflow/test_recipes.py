@@ -57,8 +57,8 @@ def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_and_a_study(repos
             (package / place).write_text(recipe)
             written += 1
     assert written == 3  # one module of a group, two of a kind
-    row = RECIPES["row of studies/kinds/scenes/outputs.py"].partition("\n")[2]
-    add_row(package / "studies/kinds/scenes/outputs.py", row, "OUTPUTS")
+    row = RECIPES["row of studies/kinds/bodies/outputs.py"].partition("\n")[2]
+    add_row(package / "studies/kinds/bodies/outputs.py", row, "OUTPUTS")
     with (repository / "workflow/rules/stages.smk").open("a") as rules:
         rules.write(f"\n\n{RECIPES['end of workflow/rules/stages.smk']}")
     study = re.search(r"^```yaml\n# config/columns.yaml\n(.*?)^```", CONTRIBUTING, re.DOTALL | re.MULTILINE)[1]

@@ -10,7 +10,7 @@ wildcard_constraints:
     bundle=bundles(),
 
 
-# Beams.
+# Beams and shapes.
 
 
 rule mesh:
@@ -62,24 +62,6 @@ use rule mesh as solve with:
         done("calibrate"),
     output:
         RESULTS / "done/{stage,solve}_{bundle}.json",
-
-
-# Shapes of any outline.
-use rule mesh as shape_mesh with:
-    output:
-        RESULTS / "done/{stage,shape_mesh}_{bundle}.json",
-
-
-use rule mesh as shape_reference with:
-    output:
-        RESULTS / "done/{stage,shape_reference}_{bundle}.json",
-
-
-use rule mesh as shape_solve with:
-    input:
-        RESULTS / "done/shape_mesh_{bundle}.json",
-    output:
-        RESULTS / "done/{stage,shape_solve}_{bundle}.json",
 
 
 # Further study kinds.

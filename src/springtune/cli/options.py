@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
     from ..problem.shapes import Shape
     from ..studies.config.model import Study
-    from ..studies.kinds.shapes.expand import Shapes
+    from ..studies.kinds.bodies.expand import Shapes
 
 
 @contextmanager
@@ -134,7 +134,7 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
     if not Path(path).is_file() or Path(path).suffix not in (".yaml", ".yml"):
         raise ValueError(f"study: '{text}': there is no study {path or text}; give one such as {STUDY_EXAMPLE}")
     study = load_study(path)
-    part = study.parts["shapes"]
+    part = study.shapes
     known = list(part.shape) if part else []
     if not name and len(known) == 1:
         (name,) = known

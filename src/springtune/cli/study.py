@@ -87,7 +87,7 @@ def scenes(config: Path, most: int | None) -> None:
     from ..studies.config.kind import kinds
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study  # here, so that --help does not wait for it
-    from ..studies.kinds.scenes.kind import summary
+    from ..studies.kinds.bodies.kind import summary
 
     try:
         study = load_study(config)

@@ -141,7 +141,7 @@ BESIDES = (
 """What a script sets besides, as runs here do."""
 
 
-IN_COMMON: dict[str, Any] = {
+NEWTON_COMMON: dict[str, Any] = {
     "program": "Newton",
     "needs": ("newton", "warp"),
     "extra": "newton",
@@ -162,7 +162,7 @@ IN_COMMON: dict[str, Any] = {
     besides="builder.color() before finalize(), of springs builder.set_coloring(groups that no spring joins); "
     + BESIDES,
     measured="1e-3, ten scenes, by the law that it has",
-    **IN_COMMON,
+    **NEWTON_COMMON,
 )
 def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Newton's solver VBD: implicit steps by vertex block descent."""
@@ -176,7 +176,7 @@ def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     dampers={"kd": DASHPOT},
     besides=BESIDES,
     measured="1e-3, nine of ten scenes; 8e-3 near buckling, by rounding: the same steps in double are 5e-4 off",
-    **IN_COMMON,
+    **NEWTON_COMMON,
 )
 def xpbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Newton's solver XPBD: springs alone, all at once in an iteration."""

@@ -17,7 +17,8 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.boundary import held, measured, side_edges, weights
+from ..problem.boundary import held, loaded_box, measured, side_edges, weights
+from ..problem.geometry import Beam
 from ..problem.loads import LoadKind
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import nearest
@@ -128,8 +129,10 @@ class Sheet:
 
     Attributes
     ----------
-    weights, measured, loading : callable
+    weights, measured, loading, loaded : callable
         Of a kind of load, see `springtune.problem.boundary`; each computed once.
+    filled : set of Beam
+        Beams that the mesh is known to fill.
     deriving : float
         Seconds spent on deriving springs so far.
     references : dict
@@ -152,6 +155,8 @@ class Sheet:
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))
+        self.loaded = cache(lambda kind: loaded_box(mesh, kind))
+        self.filled: set[Beam] = set()
         self.references: dict[tuple[object, ...], Any] = {}
         self._most = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None

@@ -25,7 +25,6 @@ from ..problem.status import Status
 from ..registry import hook
 from ..safe_io.tables import Tabled, number_text
 from ..springs.base import Springs
-from .meshes import is_a
 from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from .statements import BeamStatement, ShapeStatement, Statement
 
@@ -150,31 +149,25 @@ class Scene(Tabled):
     ) -> None:
         if kinematics not in KINEMATICS:
             raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
-        self.kinematics, self.load = kinematics, load
+        self.kinematics = kinematics
         self.statement: Statement
         if isinstance(beam, Shape):
             if force is not None:
                 raise ValueError(f"force: {force!r} is not used, since loads of a shape have their sizes; give scale")
-            about = self.statement = ShapeStatement(beam, mesh, material, load, scale, kinematics)
+            about = self.statement = ShapeStatement(beam, mesh, material, load, scale, kinematics, sheet)
             self.shape, self.grouped, self.case, self.scale = beam, about.grouped, about.case, about.scale
             self.by_part = about.by_part
         else:
             if scale != 1:
                 raise ValueError(f"scale: {scale!r} is of loads of shapes alone; give another force")
-            of_beam = self.statement = BeamStatement(beam, mesh, material, load, force, kinematics)
+            of_beam = self.statement = BeamStatement(beam, mesh, material, load, force, kinematics, sheet)
             self.beam, self.material, self.kind = beam, of_beam.material, of_beam.kind
             self.force, self.follower = of_beam.force, of_beam.follower
-        self.mesh = self.statement.mesh
+        self.mesh, self.sheet, self.load = self.statement.mesh, self.statement.sheet, load
         self.definition = definition_of(definition)
         self.statement.check(self.definition)
         self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
         check_stiffness(self.definition, stiffness)
-        if sheet is not None:
-            is_a(sheet, Sheet, "sheet", "that of another scene")
-        thickness = self.statement.thickness
-        self.sheet = Sheet(self.mesh, thickness) if sheet is None else sheet
-        if self.sheet.mesh is not self.mesh or self.sheet.thickness != thickness:
-            raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
 
     def __repr__(self) -> str:
         about = self.statement

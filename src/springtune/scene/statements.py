@@ -21,21 +21,20 @@ from ..problem.boundary import (
     displacement_weights,
     followed,
     forces,
-    loaded_box,
     particle_masses,
     reaction_weights,
     supported,
 )
 from ..problem.geometry import Beam, warn_of_size, warn_of_thickness
-from ..problem.loads import LOADS, LoadKind
+from ..problem.loads import LOADS, Load, LoadKind
 from ..problem.materials import AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
+from .meshed import check_meshed
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
-from .shape_meshes import check_meshed
-from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved
+from .sheet import Loading, Sheet, Solution, chosen, solved
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
@@ -66,6 +65,7 @@ class Statement(ABC):
     case: LoadCase
     loading: Loading
     by_part: Mapping[str, AnyMaterial]
+    sheet: Sheet
 
     @property
     def mesh(self) -> Mesh:
@@ -192,26 +192,30 @@ class BeamStatement(Statement):
         beam: Beam,
         mesh: Mesh | GroupedMesh,
         material: AnyMaterial | Mapping[str, AnyMaterial],
-        load: str,
+        load: str | Load,
         force: float | str | None,
         kinematics: str,
+        sheet: Sheet | None = None,
     ) -> None:
         is_a(beam, Beam, "beam", A_BEAM)
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
         assert isinstance(mesh, Mesh) and isinstance(material, Material)  # for type checkers
-        check_filled(mesh, beam)
-        about = chosen(LOADS, load, "load")
+        self.sheet = sheet_of(mesh, beam.thickness, sheet)
+        if beam not in self.sheet.filled:
+            check_filled(mesh, beam)
+            self.sheet.filled.add(beam)
+        about = load if isinstance(load, Load) else chosen(LOADS, load, "load")
         if force is None:
             raise ValueError("force: none; give the size of the force on the beam such as '400 kN'")
         self.size = positive(force, "force", "force")
         self.force = about.sign * self.size
-        self.beam, self.material, self.load, self.kind, self.case = beam, material, load, about.kind, about.kind.case
+        self.beam, self.material, self.kind, self.case = beam, material, about.kind, about.kind.case
+        self.load = about.kind.name if isinstance(load, Load) else load
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
-        self.body, self.label, self.thickness = beam.label, f"{load} of {self.size:g} N", beam.thickness
+        self.body, self.label, self.thickness = beam.label, f"{self.load} of {self.size:g} N", beam.thickness
         self.by_part = {"": material}
-        self.grouped = loaded_box(mesh, self.kind)
-        self.loading = box_loading(mesh, self.kind, self.follower)
+        self.grouped, self.loading = self.sheet.loaded(self.kind), self.sheet.loading(self.kind, self.follower)
 
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the load."""
@@ -251,6 +255,7 @@ class ShapeStatement(Statement):
         load: str,
         scale: float,
         kinematics: str,
+        sheet: Sheet | None = None,
     ) -> None:
         is_a(shape, Shape, "shape", A_SHAPE)
         if isinstance(grouped, Mesh):
@@ -265,9 +270,10 @@ class ShapeStatement(Statement):
             warn_of_thickness(shape.thickness, sides, f"shape {shape.name!r}")
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
-        self.load, self.scale, self.force = load, float(scale), 1.0
+        self.scale, self.force = float(scale), 1.0
         self.size = abs(self.scale)
         self.case = scaled(chosen(shape.loads, load, "load"), self.scale)
+        self.load, self.sheet = self.case.name, sheet_of(self.mesh, self.thickness, sheet)
         if not self.case.quantities:
             raise ValueError(f"load {load!r}: asks for nothing; give it quantities, the main one first")
         self.kinematics = kinematics
@@ -350,6 +356,16 @@ class ShapeStatement(Statement):
         """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
         law = super().law(sheet, definition)
         return "" if law == "st-venant" and not self.objection(sheet) else law
+
+
+def sheet_of(mesh: Mesh, thickness: float, sheet: Sheet | None) -> Sheet:
+    """Return the sheet of another scene, if it is of this mesh and thickness, or a new one."""
+    if sheet is None:
+        return Sheet(mesh, thickness)
+    is_a(sheet, Sheet, "sheet", "that of another scene")
+    if sheet.mesh is not mesh or sheet.thickness != thickness:
+        raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
+    return sheet
 
 
 def scaled(case: LoadCase, scale: float) -> LoadCase:

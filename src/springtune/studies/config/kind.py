@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _PACKAGES = Path(__file__).parents[1] / "kinds"
 
-_FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "shapes")
+_FIRST = ("bodies", "moduli", "laying", "stability", "benchmark", "samples")
 
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
@@ -141,6 +141,8 @@ class Kind:
     alone : dict of str to tuple
         Keys that a study may have instead of grids, and what each needs; by default its optional keys, which need beams
         and materials.
+    reads : tuple of str
+        Other keys of a study that it reads, such as ``grids``.
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional
@@ -171,6 +173,7 @@ class Kind:
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     alone: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    reads: tuple[str, ...] = ()
     files: Callable[[Any], Iterable[Path]] = lambda part: ()
     check: Callable[[Any, Problems], None] = lambda config, problems: None
     expand: Callable[[Any, Any], Any] = lambda config, declared: ()
@@ -187,7 +190,7 @@ class Kind:
 
     def wanted(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""
-        return not self.study_fields or any(getattr(config, key) for key in self.study_fields)
+        return not self.study_fields or any(getattr(config, key) for key in (*self.study_fields, *self.reads))
 
 
 def stem(name: str, selection: Mapping[str, str]) -> str:

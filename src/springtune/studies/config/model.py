@@ -180,6 +180,11 @@ class Study:
         """Names of the declared materials in plane strain."""
         return tuple(name for name, one in self.materials.items() if getattr(one, "plane", "") == "strain")
 
+    @property
+    def shapes(self) -> Any:
+        """Shapes that grids ask for, see `springtune.studies.kinds.bodies.expand.Shapes`; None if there are none."""
+        return self.parts["bodies"]["shapes"] if self.parts["bodies"] else None
+
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.
 
@@ -207,7 +212,7 @@ class Study:
         >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
         patch: -0.4 %
         """
-        known = self.parts["shapes"].shape if self.parts["shapes"] else {}
+        known = self.shapes.shape if self.shapes else {}
         if name not in known:
             there = nearest(name, known) if known else "the study has none; add it under 'shapes'"
             raise ValueError(f"shape: '{name}' is unknown; {there}")
@@ -225,7 +230,7 @@ class Study:
         {'': 'third'}
         """
         self.shape(shape)
-        own = self.parts["shapes"].parts[shape]
+        own = self.shapes.parts[shape]
         return {"": self.material(material)} | {part: self.material(name) for part, name in own.items()}
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:

@@ -72,7 +72,7 @@ ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, FACTOR)) | BEST, 
 
 
 def groups(study, folder):
-    """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
+    """Groups of a dataset, see `springtune.studies.kinds.bodies.collect.groups`."""
     made, found = {}, [(task.of, task.labels | result) for task, result in results(STAGE, study, folder)]
     for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
         rows = [row for of_curve, row in found if of_curve == wanted]

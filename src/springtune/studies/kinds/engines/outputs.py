@@ -69,7 +69,7 @@ ENGINE_COLUMNS = {
 
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
-    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
     from ...output.tables import listed  # here, since a plan does without xarray
     from . import RUN_ENDS
 

@@ -51,7 +51,7 @@ LAYING_COLUMNS = {
 
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
-    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
     from ...output.tables import listed  # here, since a plan does without xarray
 
     if "laying" not in tree:

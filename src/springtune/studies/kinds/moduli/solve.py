@@ -5,12 +5,12 @@ from springtune.problem.status import Status
 from springtune.scene.moduli import MeshModuli
 from springtune.springs.base import DefinitionError
 
-from ..scenes.mesh import make
+from ..bodies.beam_mesh import make_beam
 
 
 def prepare(patch, content):
     """Moduli of the mesh of a patch, which definitions share."""
-    return MeshModuli(make(patch["mesh"]))
+    return MeshModuli(make_beam(patch["mesh"]))
 
 
 def solve(task, moduli):

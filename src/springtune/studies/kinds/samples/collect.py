@@ -16,7 +16,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from ...output.dataset import Group
 from ...runs import store
-from ..scenes import any_reference
+from ..bodies import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
 from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key
@@ -74,7 +74,7 @@ SOBOL = Group(
 
 
 def groups(study, folder):
-    """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
+    """Groups of a dataset, see `springtune.studies.kinds.bodies.collect.groups`."""
     sample = study.parts["samples"]
     drawn, results = _stored(sample, folder / "samples")
     axes = study.axes | {

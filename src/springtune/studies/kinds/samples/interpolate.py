@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...runs.attempts import Attempts
-from ..scenes import unit_references
+from ..bodies import unit_references
 from .designs import draw
 
 

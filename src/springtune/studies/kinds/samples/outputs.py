@@ -75,7 +75,7 @@ VIEWS = (
 
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
-    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
     if "sobol" not in tree:
         return []
     found = tree["sobol"].to_dataset()

@@ -1,4 +1,4 @@
-"""Stages of scenes: tasks of their jobs, and keys of their results."""
+"""Tasks of beams, the keys of their results, and which references are interpolated."""
 
 import hashlib
 from collections import defaultdict
@@ -11,7 +11,6 @@ from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem, unit_scales
 from springtune.springs.base import DEFINITIONS
 
-from ...config.kind import Stage
 from ...config.model import keeps_fields, once_a_study, shown
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task
@@ -161,7 +160,11 @@ def expected_solves(box: "Box") -> int:
 @cache
 def mesh_key(mesh):
     """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
-    return hash_of(mesh_parameters(mesh), stage_key("studies.kinds.scenes.mesh"), mesh_type_key(mesh.mesh_type))
+    return hash_of(
+        mesh_parameters(mesh),
+        stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.shape_mesh",)),
+        mesh_type_key(mesh.mesh_type),
+    )
 
 
 def mesh_parameters(mesh):
@@ -203,7 +206,7 @@ def stem(mesh):
 
 
 def reference_of(study, beam, material, load):
-    """Reference of a beam, material and load, as `springtune.studies.kinds.scenes.any_reference.read` takes it."""
+    """Reference of a beam, material and load, as `springtune.studies.kinds.bodies.any_reference.read` takes it."""
     solved = solved_reference(beam, material, load)
     name = LOADS[load].kind.name
     box, problems = interpolants(study).get(name, (None, {}))
@@ -212,34 +215,46 @@ def reference_of(study, beam, material, load):
     return solved | {"interpolant": interpolant_key(name, box), "problem": problems[beam, material, load]}
 
 
+def _reference_code(*without):
+    """Key of the code that solves references of beams."""
+    return stage_key("studies.kinds.bodies.reference", without=("studies.kinds.bodies.shape_reference", *without))
+
+
+OF_OTHERS = (
+    "studies.kinds.bodies.task_values",
+    *(f"reference.{name}" for name in ("small_strain", "shapes", "finite_shapes", "finite_strain")),
+)
+"""Modules that scenes import and those of beams do not call: references are tasks of their own."""
+
+
 @cache
 def interpolant_key(kind, box):
     """Key of an interpolant, which all unit problems in its box share."""
-    return hash_of(
-        "interpolant", kind, box, stage_key("studies.kinds.scenes.reference", without=("reference.finite_strain",))
-    )
+    return hash_of("interpolant", kind, box, _reference_code("reference.finite_strain"))
 
 
 @cache
 def solved_reference(beam, material, load):
     """Reference that is solved by itself, under the key of its unit problem, which scaled beams share."""
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key("studies.kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant"))
-    key = hash_of(_unit_problem(beam, material, load), code)
+    code = _reference_code("reference.finite_strain", "reference.interpolant")
+    key = hash_of(unit_problem_of(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
 
 def finite_key(reference, kind):
     """Key of a reference at finite strain."""
-    return hash_of(_finite_problem(reference, kind), stage_key("studies.kinds.scenes.reference"))
+    return hash_of(finite_problem(reference, kind), _reference_code())
 
 
-def _unit_problem(beam, material, load):
+def unit_problem_of(beam, material, load):
+    """Aspect ratio, Poisson's ratio and name of the kind of load of a beam's reference."""
     aspect_ratio, nu, kind = unit_problem(beam, material, LOADS[load].kind)
     return aspect_ratio, nu, kind.name
 
 
-def _finite_problem(reference, kind):
+def finite_problem(reference, kind):
+    """Values of the task of a reference at finite strain."""
     law, _, plane = kind.partition("-plane-")
     load = LOADS[reference.load]
     found = {"law": law, "plane": plane, "load": load.kind.name, "force": reference.force, "follower": load.follower}
@@ -271,7 +286,7 @@ def _scene_tasks(study, mesh, scenes):
         if scene.definition == "calibrated":  # stiffness is proportional to thickness
             group = calibration_name(scene)
             further["calibration"] = calibrations(study)[group].key
-            own["thickness_ratio"] = mesh.beam.thickness / _calibrating(study)[group][0].mesh.beam.thickness
+            own["thickness_ratio"] = mesh.beam.thickness / calibrating(study)[group][0].mesh.beam.thickness
         if scene in kept:
             further["keep_fields"] = True
         yield {**task, **own, **further, "key": hash_of(key, own)}
@@ -290,7 +305,7 @@ def _shared(study, mesh, material, load, definition, kinematics):
     reference = reference_of(study, mesh.beam, material, load)
     if "interpolant" not in reference:  # which has no field, all that a scene wants of it
         task["reference"] = reference
-    code = stage_key("studies.kinds.scenes.solve"), definition_key(definition)
+    code = stage_key("studies.kinds.bodies.solve", without=OF_OTHERS), definition_key(definition)
     return task, hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
 
 
@@ -304,7 +319,7 @@ def curve_task(study, curve):
         "stiffnesses": [ratio * membrane for ratio in study.stiffness_ratios],
         "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
     }
-    return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.scenes.sensitivity"))} | task
+    return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.bodies.sensitivity"))} | task
 
 
 @once_a_study
@@ -314,7 +329,7 @@ def shown_scenes(study):
 
 
 @once_a_study
-def _calibrating(study):
+def calibrating(study):
     """Curves that calibrate each group of scenes."""
     found = defaultdict(list)
     for one in study.curves:
@@ -328,45 +343,6 @@ def calibration_name(scene):
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
 
 
-# -- stages ------------------------------------------------------------------------------------------------------------
-
-
-def _mesh_tasks(study):
-    """Tasks of meshes, each with the expected seconds of all its scenes and curves."""
-    curves = curves_by_mesh(study)
-    for mesh, scenes in scenes_by_mesh(study).items():
-        count = particles(mesh)
-        seconds = (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
-        seconds += sum(expected_seconds(count, scene.definition) for scene in scenes)
-        yield Task(mesh_source(mesh), seconds=seconds, name=stem(mesh), file=stem(mesh), key=mesh_key(mesh))
-
-
-def _reference_tasks(study):
-    """Tasks of references, of which those that share elements are in one job, and of interpolants."""
-    found = {}
-    for one in study.references:
-        body = one.beam, one.material, one.load
-        if "interpolant" not in reference_of(study, *body):
-            problem, key = _unit_problem(*body), solved_reference(*body)["key"]
-            name = hash_of(problem[0], problem[2])
-            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
-        for kind in study.further_references:
-            values, key = _finite_problem(one, kind), finite_key(one, kind)
-            found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
-    yield from found.values()
-    for kind, (box, problems) in interpolants(study).items():
-        key = interpolant_key(kind, box)
-        keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-        values = {"kind": kind, "box": box, "problems": keys}
-        yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
-
-
-def _curve_tasks(study):
-    for mesh, curves in curves_by_mesh(study).items():
-        for task in (curve_task(study, one) for one in curves):
-            yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
-
-
 @once_a_study
 def calibrations(study):
     """Tasks of the groups of scenes that share a calibrated stiffness, all in one job and file."""
@@ -375,37 +351,8 @@ def calibrations(study):
         place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
         return place | {"load": curve.load, "force": curve.force}
 
-    code, found = stage_key("studies.kinds.scenes.calibrate"), {}
+    code, found = stage_key("studies.kinds.bodies.calibrate"), {}
     for name in sorted({calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}):
-        members = [named(one) for one in _calibrating(study)[name]]
+        members = [named(one) for one in calibrating(study)[name]]
         found[name] = Task({"members": members}, name="all", file=CALIBRATION, key=hash_of(members, code))
     return found
-
-
-def _solve_tasks(study):
-    for mesh, tasks in scene_tasks(study).items():
-        shared, name = {"thickness": mesh.beam.thickness}, stem(mesh)
-        for task in tasks:
-            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
-
-
-STAGES = (
-    Stage("reference", "studies.kinds.scenes.reference", _reference_tasks, "references"),
-    Stage("mesh", "studies.kinds.scenes.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
-    Stage("sensitivity", "studies.kinds.scenes.sensitivity", _curve_tasks, "curves", like="mesh", every=("reference",)),
-    Stage(
-        "calibrate",
-        "studies.kinds.scenes.calibrate",
-        lambda study: calibrations(study).values(),
-        "curves",
-        every=("sensitivity",),
-    ),
-    Stage(
-        "solve",
-        "studies.kinds.scenes.solve",
-        _solve_tasks,
-        "solutions",
-        like="mesh",
-        every=("reference", "calibrate"),
-    ),
-)

@@ -8,7 +8,7 @@ from springtune.safe_io.escapes import no_mathematics
 from ...output import drawing, labels, style
 from ...output.dataset import STATUS
 from ...output.selection import cells, choose, group, labels_of
-from .outputs import DEFORMED, ERRORS, figures
+from .outputs import DEFORMED, ERRORS, shape_figures
 
 NETWORK_COLUMNS = 3
 """Networks side by side."""
@@ -27,7 +27,7 @@ def shapes(tree):
     """Figures of shapes: all quantities; and of each shape and load its errors, and its networks."""
     data = group(tree, "shapes")
     plots = {ERRORS: plot_shape_errors, DEFORMED: plot_shape}
-    for stem, selection in figures(cells(data.status != 0, ("shape", "load"))).items():
+    for stem, selection in shape_figures(cells(data.status != 0, ("shape", "load"))).items():
         plot = next((plots[name] for name in plots if stem.startswith(name)), plot_shapes)
         yield stem, plot, selection
 

@@ -1,6 +1,5 @@
-"""Stage `shape_reference`: one finite-element solution each shape, material and load, on the shape itself."""
+"""References of shapes, which the stage `reference` solves: one each shape, material and load, on the shape itself."""
 
-import time
 from functools import partial
 
 import numpy as np
@@ -10,40 +9,30 @@ from springtune.mesh.sheets import outline_of, rounds
 from springtune.problem.materials import of_parts
 from springtune.reference.shapes import solve_each
 
-from .mesh import make
+from .shape_mesh import make_shape
 from .task_values import ONE_LOAD, by_key, materials_of, quantity_key, shape_of
 
 ALONG = 24
 """Points along a side of an outline that is drawn."""
 
 
-def failed(task, why):
-    """Result of a reference that fails."""
-    return {"message": why, "seconds": 0.0}
-
-
 def solve(task):
-    """Result of a reference: ``shape`` is as `mesh.make` takes it, load and materials as `task_values` has them."""
-    begin = time.perf_counter()
-    return _solved(task) | {"seconds": time.perf_counter() - begin}
-
-
-def _solved(task):
+    """Result of a reference: ``shape`` is as `make_shape` takes it, load and materials as `task_values` has them."""
     solver = None
     if "law" in task:
         from springtune.reference.finite_shapes import solve_finite_shape  # here: most references are of small strain
 
         solver = partial(solve_finite_shape, law=task["law"])
-    grouped = make(task["shape"]) if "file" in task["shape"] else None
+    grouped = make_shape(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
     try:
         materials = of_parts(materials, parts_of(grouped)) if grouped else materials
     except ValueError as error:  # of a file that is too large to be checked before
-        return failed(task, str(error))
+        return {"message": str(error)}
     case = shape.loads[ONE_LOAD]
     found, lacking = solve_each(shape, case, materials, grouped, solver)
     if not found:
-        return failed(task, "; ".join(dict.fromkeys(lacking.values())))
+        return {"message": "; ".join(dict.fromkeys(lacking.values()))}
     values, estimates = {}, {}
     for one in found:
         values |= by_key(one.values, case)

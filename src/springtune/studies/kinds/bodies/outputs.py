@@ -1,11 +1,12 @@
 """Outputs of scenes, and what the page to browse shows of scenes, curves and references."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
+from ...config.kind import stem as figure_stem
 from ...config.model import once_a_study, swept_value
 from ...output.browse import Plot, View, particle_plots
 
@@ -27,7 +28,7 @@ SWEPT_SHOWN = {
 }
 """What a study sweeps along an axis and in a column, and the unit there over that of the dataset."""
 
-PLOTS, ERROR_PLOTS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
+PLOTS, ERROR_PLOTS = "studies.kinds.bodies.figures", "studies.kinds.bodies.errors"
 
 TABLE = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""
@@ -46,6 +47,7 @@ def stems(study: "Study") -> list[str]:
     found = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
     found += ["finite_strain"] if study.further_references else []
     found += ["block"] if pressed(study) else []
+    found += ["shapes"] if study.shapes else []
     return found
 
 
@@ -76,6 +78,45 @@ def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
         several = [dict(zip(SCENE_LABELS, place)) for place, members in values.items() if len(members) > 1]
         found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
     return found
+
+
+MESH_AXES = ("shape", "mesh_type", "mesh_size")
+CASE_AXES = ("shape", "material", "load")
+SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
+"""Dimensions of the group ``/shapes``."""
+
+MADE = "free"
+"""Mesh type of shapes with an outline: Delaunay triangles inside it."""
+
+OWN_FILE = "file"
+"""Mesh type of a shape whose mesh is that of its file."""
+
+DRAWING = "shapes"
+"""Output that is made of whole networks."""
+
+OVERVIEW = "shapes_overview"
+"""Stem of the figure of all quantities."""
+
+ERRORS, DEFORMED = "shapes_errors", "shapes_deformed"
+"""First parts of the stems of the figures of a shape under a load."""
+
+
+def mesh_name(one: Any) -> str:
+    """Readable name of a scene's mesh."""
+    return f"{one.shape}_{one.mesh_type}" + (f"_{1e3 * one.mesh_size:.9g}mm" if one.mesh_size else "")
+
+
+def shape_figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
+    """Figures by stem: of all quantities, and of each shape and load its errors and its networks."""
+    found: dict[str, dict[str, str]] = {OVERVIEW: {}} if cases else {}
+    for name in (ERRORS, DEFORMED):
+        found |= {figure_stem(name, one): one for one in cases}
+    return found
+
+
+def _shape_cases(study: "Study") -> "list[dict[str, str]]":
+    pairs = dict.fromkeys((one.shape, one.load) for one in study.shapes.scenes) if study.shapes else ()
+    return [{"shape": shape, "load": load} for shape, load in pairs]
 
 
 OUTPUTS = (
@@ -127,6 +168,14 @@ OUTPUTS = (
         plot=f"{PLOTS}:block",
         job="scenes",
         lack=_lack_of_pressure,
+    ),
+    Output(
+        DRAWING,
+        "figures of shapes: errors of their quantities, and their deformed networks (and the group `/shape_fields` "
+        "behind them)",
+        figures=lambda study: shape_figures(_shape_cases(study)),
+        plot="studies.kinds.bodies.shape_figures:shapes",
+        usual=True,
     ),
 )
 
@@ -208,5 +257,38 @@ VIEWS = (
             *particle_plots("outline of the reference"),
             Plot("displacements of the outline", "reference_displacement_x", "outline_x", along="outline_point"),
         ),
+    ),
+    View(
+        "/shapes",
+        "Shapes",
+        "Quantities of interest of bodies of any outline: networks beside converged references on the same shape, and "
+        "beside the numbers of others.",
+        (
+            Plot("error over particles", "error", "particles", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
+            Plot("error over seconds", "error", "solve_seconds", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
+            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
+            Plot("errors of definitions on shapes", "error", "shape", "definition", "map"),
+            Plot("difference to what others give", "expected_error", "particles", "definition", along="mesh_size",
+                 ascending=True, log="xy"),
+            Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
+        ),
+    ),
+    View(
+        "/shapes_finite_strain",
+        "Shapes at finite strain",
+        "Errors of networks that have a law at finite strain, against references of that law.",
+        (
+            Plot("error over mesh size", "error", "mesh_size", "definition", log="xy"),
+            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
+            Plot("quantities of the references", "reference_value", "load", "law"),
+        ),
+    ),
+    View(
+        "/shape_fields",
+        "Networks of shapes",
+        "Positions and displacements of all particles, of each shape and load.",
+        particle_plots("outline"),
     ),
 )  # fmt: skip

@@ -12,21 +12,22 @@ from ...output.page import MOST_ROWS, error_decimals, head
 from ...output.selection import cells, labels_of, of_own_law, own_laws, records
 from ...output.tables import listed
 from ...output.text import decimals, number
-from .outputs import SWEPT_SHOWN, TABLE, stem
+from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE, stem
 
 ROW = ("beam", "mesh_size")
 
 
 def tables(tree):
-    """Tables of the page: the paper's, and those of references at finite strain and of pressed faces."""
+    """Tables of the page: the paper's, those of references at finite strain and of pressed faces, and of shapes."""
+    shapes = [_shapes(tree)] if "shapes" in tree else []
     root = tree.to_dataset()
     if "status" not in root:  # a study without scenes
-        return []
+        return shapes
     finite = _finite(tree)
     found = [_table(root.sel(selection), selection, finite) for selection in cells(root.status != 0, TABLE)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
     groups = {"finite_strain": _finite_strain, "block": _block}
-    return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree]
+    return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree] + shapes
 
 
 def _finite(tree):
@@ -223,3 +224,32 @@ def _block(block, root):
         "of small strain; all pairs are in the dataset."
     )
     return {"stem": "block", "title": "The pressed face", "note": note, "rows": rows}
+
+
+SHAPE_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "material", "mesh_type")
+"""First columns: what a value is of."""
+
+SHAPE_ERRORS = ("error", "expected_error", "reference_error_estimate")
+
+
+def _shapes(tree):
+    """Table of the quantities of shapes."""
+    data = tree["shapes"].to_dataset()
+    present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
+    present = present.transpose(*SCENE_AXES, "quantity")
+    columns = {"mesh_size_mm": ("mesh_size", 1e3), "particles": ("particles", 1), "value": ("value", 1)}
+    columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
+    columns |= {f"{name}_percent": (name, 100) for name in SHAPE_ERRORS}
+    columns |= {name: (name, 1) for name in ("status", "message")}
+    rows = [row | {"status": STATUS[row["status"]]} for row in listed(data, present, SHAPE_COLUMNS, columns)]
+    cited = (one for one in records(data, present, ["source"]) if one["source"])
+    sources = dict.fromkeys(f"{one['shape']}, {one['quantity']}: {one['source']}" for one in cited)
+    strained = tree.attrs.get("plane_strain")
+    note = (
+        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress "
+        f"{f'(plane strain of {strained}) ' if strained else ''}by converged finite elements on the same shape, and "
+        "errors are signed: (network − reference) / |reference|, and the same against the expected values that others "
+        "give."
+    )
+    told = "; ".join(sources)
+    return {"stem": "shapes", "title": "Shapes", "note": f"{note} Sources: {told}." if told else note, "rows": rows}

@@ -1,0 +1,154 @@
+"""Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``.
+
+And the summary of a study before it runs. Sections of beams are in `springtune.studies.config.sections`.
+"""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from springtune.mesh.cells import MeshError
+from springtune.problem.geometry import size_text
+from springtune.problem.loads import LOADS
+from springtune.reference.answers import unit_problem
+from springtune.safe_io.tables import aligned
+
+from ...config.kind import Kind
+from ...config.model import SceneSpec, Study
+from .outputs import OUTPUTS, OWN_FILE, stems
+from .plan import expected_solves, interpolants, reference_of
+from .sections import SHAPE_GRIDS_KEY, SHAPES_KEY
+from .shape_plan import by_mesh
+from .stages import STAGES
+
+
+def _check(config, problems):
+    if not (config.shapes or config.shape_grids):
+        return
+    from .expand import check  # here, as below: most studies have no shapes
+
+    check(config, problems)
+
+
+def _expand(config, declared):
+    if not config.shape_grids:
+        return {"shapes": None}
+    from .expand import expand
+
+    return {"shapes": expand(config, declared)}
+
+
+def _axes(found):
+    part = found["shapes"]
+    if not part:
+        return {}
+    labels = {name: tuple(dict.fromkeys(getattr(one, name) for one in part.scenes)) for name in vars(part.scenes[0])}
+    pairs = dict.fromkeys((one.shape, one.load) for one in part.scenes)
+    asked = [one.name for shape, load in pairs for one in part.shape[shape].loads[load].quantities]
+    return labels | {"quantity": tuple(dict.fromkeys(asked))}
+
+
+def _size(shape, file):
+    """Extents of a shape in words, or of a mesh file of it."""
+    if not file:
+        return size_text(*np.ptp(shape.extent, axis=0))
+    from springtune.mesh.formats import read_shape  # here: few studies have files
+
+    try:
+        sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0)
+    except MeshError as error:
+        return str(error)
+    return f"{size_text(*sides)}, {Path(file).name} in units of {shape.unit:g} m"
+
+
+def _summary(found):
+    part = found["shapes"]
+    if not part:
+        return []
+    sizes = Counter((one.shape, one.mesh_size * (one.mesh_type == OWN_FILE)) for one in part.scenes)
+    cases = {(one.shape, one.load) for one in part.scenes}
+    quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
+    used = {one.shape for one in part.scenes}
+    shapes = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(by_mesh(part))} meshes"
+    rows = [["shape scenes", len(part.scenes), f"of {shapes}, {quantities} quantities"]]
+    rows += [
+        [f"  {name}", count, _size(part.shape[name], part.files[name].get(size, ""))]
+        for (name, size), count in sizes.items()
+    ]
+    if count := len(part.referred) + len(part.finite):
+        rows.append(["shape references", count, "finite elements on the shapes themselves"])
+    return rows
+
+
+def _files(found):
+    part = found["shapes"] if found else None
+    used = dict.fromkeys(one.shape for one in part.scenes) if part else ()
+    return [Path(file) for shape in used for file in part.files[shape].values()]
+
+
+KIND = Kind(
+    "bodies",
+    study_fields={"shapes": SHAPES_KEY, "shape_grids": SHAPE_GRIDS_KEY},
+    alone={"shape_grids": ("shapes", "materials")},
+    reads=("grids",),
+    files=_files,
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    summary=_summary,
+    stages=STAGES,
+    outputs=OUTPUTS,
+    tables=stems,
+)
+
+
+def summary(study: Study, further: list[list[object]]) -> str:
+    """Summary of a study as text: what it asks for, and what is shared."""
+    title = f"{study.name}: {study.title}"
+    if not study.scenes:
+        return "\n".join([title, "", aligned(further, left=0, right=(1,))])
+    # Sheets of several thicknesses share a mesh.
+    meshes = len({(one.beam.length, one.beam.height, one.mesh_type, one.mesh_size, one.file) for one in study.meshes})
+    each = (len(study.scenes) + len(study.curves)) / meshes
+    requested = sum(len(grid.scenes) for grid in study.grids)
+    repeated = requested - len(study.scenes)
+    again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
+    scaled = "small strain scales with force, E t and size"
+    rows: list[list[object]] = [
+        ["scenes", len(study.scenes), again],
+        ["meshes", meshes, f"each serves {each:.3g} scenes and curves on average"],
+        ["references", len(study.references), f"from {_solutions(study)}: {scaled}"],
+        ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
+        *further,
+        *([["printed", len(study.printed), "cells to compare with"]] if study.printed else []),
+    ]
+    grids = aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))
+    return "\n".join([title, "", aligned(rows, left=0, right=(1,)), "", grids])
+
+
+def _solutions(study: Study) -> str:
+    """Number of finite-element solutions of the references, in words."""
+    known = interpolants(study)
+    problems = {
+        unit_problem(one.beam, one.material, LOADS[one.load].kind)
+        for one in study.references
+        if "interpolant" not in reference_of(study, one.beam, one.material, one.load)
+    }
+    if not known:
+        return f"{len(problems)} solution{'s' * (len(problems) != 1)}"
+    count = len(problems) + sum(expected_solves(box) for box, _ in known.values())
+    return f"about {count} solutions and interpolation between them"
+
+
+def _contributions(study: Study) -> list[list[object]]:
+    """Rows of a table of grids; new scenes are those that no grid above has."""
+    rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
+    seen: set[SceneSpec] = set()
+    for grid in study.grids:
+        scenes = set(grid.scenes)
+        references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
+        meshes = {scene.mesh for scene in scenes}
+        rows.append([grid.name, len(scenes), len(scenes - seen), len(meshes), len(references), len(grid.curves)])
+        seen |= scenes
+    return rows

@@ -1,0 +1,173 @@
+"""Stage `solve`: the mass-spring network of every scene of a beam or a shape, all scenes of a mesh together."""
+
+import time
+from dataclasses import replace
+from functools import cache, partial
+from math import copysign
+from pathlib import Path
+
+import numpy as np
+
+from springtune.mechanics.statics import SingularError
+from springtune.problem.boundary import FACE_POSITIONS, check_case
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import LOAD_KINDS, Load
+from springtune.problem.materials import material_of
+from springtune.problem.status import Status
+from springtune.reference.answers import field_error, interpolate
+from springtune.scene.sheet import Sheet, definition_of, named
+from springtune.scene.statements import BeamStatement, ShapeStatement
+from springtune.springs.base import DEFINITIONS, DefinitionError
+
+from ...runs.source import hash_of
+from . import stored
+from .stored import stored_key
+
+parts = stored.parts
+
+
+def tasks(family, content):
+    """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
+    if not any("calibration" in scene for scene in family["tasks"]):
+        return family["tasks"]
+    calibration = stored.read_calibration(content["results"])
+    return [
+        scene | {"key": stored_key(scene, calibration), "calibrated": calibration.get(scene.get("calibration"))}
+        for scene in family["tasks"]
+    ]
+
+
+def prepare(family, content):
+    """Function that solves the scenes of one mesh; ``family`` is a file of a job, see `springtune.studies.runs.job`."""
+    grouped = stored.prepared(content, family)
+    if "shape" in family:
+        return partial(solve_shape, family["shape"], grouped, {})
+    mesh, labels = grouped.mesh, ("x", "y", "displacements")
+
+    @cache
+    def for_one(key, length):
+        """Displacements for 1 N of a material that moves by 1 m; None where the reference has none."""
+        scales = {"key": key, "length": length, "displacement": 1.0}
+        found = stored.read_reference(Path(content["results"]) / "references", scales, labels)
+        return interpolate(*(found[label] for label in labels), mesh.points) if "x" in found else None
+
+    def field(reference):
+        unit = for_one(reference["key"], reference["length"])
+        return None if unit is None else reference["displacement"] * unit
+
+    beam = Beam(*family["beam"])
+    return partial(solve_beam, beam, Sheet(mesh, beam.thickness), field)
+
+
+def failed(task, why):
+    """Result of a scene that fails."""
+    return {"status": Status.FAILED, "message": why, "seconds": 0.0}
+
+
+def order(task):
+    """Sort key that puts scenes of one network beside each other."""
+    if "materials" in task:
+        return task["definition"], hash_of(task["materials"])
+    uniform = DEFINITIONS[task["definition"]].uniform
+    return ("" if uniform else task["definition"], task["material"]["poisson_ratio"], LOAD_KINDS[task["kind"]].held)
+
+
+def solve(task, solve_one):
+    """Result of a scene, ready to be stored: lengths [m], stiffnesses [N/m], forces [N]."""
+    begin = time.perf_counter()
+    try:
+        return solve_one(task)
+    except DefinitionError as error:
+        return failed(task, f"{task['definition']}: {error}") | {"seconds": time.perf_counter() - begin}
+
+
+def _solved(about, springs, seconds, task):
+    """Equilibrium of a scene, with what is stored of each scene, and the arrays of one that is drawn."""
+    begin = time.perf_counter()
+    found = about.solve(about.sheet, springs)
+    result = {
+        "status": found.status,
+        "message": found.message,
+        "seconds": time.perf_counter() - begin,
+        "definition_seconds": seconds,
+        "negative_pivots": found.negative_pivots,
+    }
+    if task.get("keep_fields") and found.equilibrium.converged:
+        moved = found.equilibrium.displacements
+        forces = found.problem.network.spring_forces(moved, task["kinematics"] == "linear")
+        result |= {"displacements": moved, "spring_stiffnesses": springs.reference * springs.relative}
+        result["spring_forces"] = springs.reference * forces
+    return found, result
+
+
+def solve_beam(beam, sheet, field, task):
+    """Result of a scene of a beam.
+
+    ``field`` returns the displacements of a scene's reference for 1 N at the particles [m], or None.
+    """
+    stiffness, group = task.get("stiffness"), task.get("calibrated")
+    if group:
+        if group["stiffness"] is None:
+            return failed(task, group["message"])
+        stiffness = group["stiffness"] * task["thickness_ratio"]
+    wanted = field(task["reference"]) if "reference" in task else None
+    kind, force, kinematics = LOAD_KINDS[task["kind"]], task["force"], task["kinematics"]
+    definition, material = definition_of(task["definition"]), material_of(task["material"])
+    springs, seconds = sheet.derive(definition, material, stiffness, (kind, force, wanted))
+    springs = replace(springs, reference=task.get("stiffness_scale", 1) * springs.reference)
+    load = Load(kind, copysign(1, force), task["follower"])
+    about = BeamStatement(beam, sheet.mesh, material, load, abs(force), kinematics, sheet)
+    solution, result = _solved(about, springs, seconds, task)
+    found = solution.equilibrium
+    result |= {
+        "iterations": found.iterations,
+        "residual": found.residual,
+        "stiffness": springs.reference if definition.uniform else np.nan,
+        "definition_evaluations": springs.evaluations,
+        "spring_ratio": springs.spring_ratio,
+        "solver": found.factor.name if found.factor else "",
+        "load_share": found.load_share if kinematics == "nonlinear" else np.nan,
+    }
+    if not found.converged:
+        last = {} if found.last is None else {"last_displacement": sheet.displacement(kind, found.last)}
+        return result | last
+    result["displacement"] = solution.displacement
+    if kind.pressed:
+        result |= _face(sheet, kind, found.displacements)
+    if wanted is not None:
+        result["field_error"] = field_error(sheet.mesh, found.displacements, force * wanted)
+    return result
+
+
+def _face(sheet, kind, displacements):
+    """Mean displacement of a pressed face and its profile, along the force [m]."""
+    weights = sheet.weights(kind)
+    face = np.flatnonzero(weights[:, kind.axis] > 0)
+    x, moved = sheet.mesh.points[face, kind.along], displacements[face, kind.axis]
+    order = np.argsort(x)
+    profile = np.interp(FACE_POSITIONS * np.ptp(x), x[order], moved[order])
+    return {"face_mean": float((weights * displacements).sum()), "face_profile": profile}
+
+
+def solve_shape(described, grouped, sheets, task):
+    """Result of a scene of a shape; its ``thickness``, ``load`` and ``materials`` are as `task_values` has them.
+
+    ``sheets`` are those of the mesh by thickness, which scenes add.
+    """
+    from .task_values import ONE_LOAD, by_key, materials_of, shape_of  # here: most studies have no shapes
+
+    shape = shape_of(described, task["thickness"], task["load"])
+    case, materials, kinematics = shape.loads[ONE_LOAD], materials_of(task["materials"]), task["kinematics"]
+    definition, sheet = definition_of(task["definition"]), sheets.get(shape.thickness)
+    try:
+        check_case(grouped, case)
+        about = ShapeStatement(shape, grouped, materials, ONE_LOAD, 1.0, kinematics, sheet)
+        about.check(definition)
+        sheets[shape.thickness] = about.sheet
+        with named(definition):
+            springs, seconds = about.springs(about.sheet, definition, None)
+        solution, result = _solved(about, springs, seconds, task)
+    # Loads on what is held, quantities that the mesh has not, definitions that refuse it; mechanisms.
+    except (ValueError, SingularError) as error:
+        return failed(task, str(error))
+    return result | {"values": by_key(about.values(springs, solution), case)}

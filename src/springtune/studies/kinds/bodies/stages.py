@@ -1,0 +1,89 @@
+"""Stages of beams and shapes: `mesh`, `sensitivity` and `solve` share bundles of meshes."""
+
+from ...config.kind import Stage
+from ...runs.plan import Task
+from ...runs.source import hash_of
+from . import plan, shape_plan
+from .outputs import DRAWING
+from .plan import expected_seconds, stem
+from .shape_plan import file_name
+
+
+def _mesh_tasks(study):
+    """Tasks of meshes, each with the expected seconds of all that is solved on it."""
+    curves, part = plan.curves_by_mesh(study), study.shapes
+    for mesh, scenes in plan.scenes_by_mesh(study).items():
+        count, name = plan.particles(mesh), stem(mesh)
+        seconds = (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
+        seconds += sum(expected_seconds(count, scene.definition) for scene in scenes)
+        yield Task(plan.mesh_source(mesh), seconds=seconds, name=name, file=name, key=plan.mesh_key(mesh))
+    for one, *others in shape_plan.by_mesh(part).values() if part else ():
+        count, name = shape_plan.particles(part, one), file_name(one)
+        seconds = sum(expected_seconds(count, scene.definition) for scene in (one, *others))
+        source = shape_plan.mesh_source(part, one)
+        yield Task(source, seconds=seconds, name=name, file=name, key=shape_plan.mesh_key(part, one))
+
+
+def _reference_tasks(study):
+    """Tasks of references, of which those that share elements are in one job, and of interpolants."""
+    found, part = {}, study.shapes
+    for one in study.references:
+        body = one.beam, one.material, one.load
+        if "interpolant" not in plan.reference_of(study, *body):
+            problem, key = plan.unit_problem_of(*body), plan.solved_reference(*body)["key"]
+            name = hash_of(problem[0], problem[2])
+            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
+        for kind in study.further_references:
+            values, key = plan.finite_problem(one, kind), plan.finite_key(one, kind)
+            found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
+    yield from found.values()
+    for kind, (box, problems) in plan.interpolants(study).items():
+        key = plan.interpolant_key(kind, box)
+        keys = {plan.solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+        values = {"kind": kind, "box": box, "problems": keys}
+        yield Task(values, seconds=3e-2 * plan.expected_solves(box), name=key, key=key)
+    for one in (*part.referred, *part.finite) if part else ():
+        task = shape_plan.reference_task(part, *one)
+        yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
+
+
+def _curve_tasks(study):
+    for mesh, curves in plan.curves_by_mesh(study).items():
+        for task in (plan.curve_task(study, one) for one in curves):
+            yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
+
+
+def _solve_tasks(study):
+    for mesh, tasks in plan.scene_tasks(study).items():
+        shared, name = {"beam": (mesh.beam.length, mesh.beam.height, mesh.beam.thickness)}, stem(mesh)
+        for task in tasks:
+            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
+    if part := study.shapes:
+        kept = shape_plan.shown(part) if DRAWING in study.outputs else ()
+        for scenes in shape_plan.by_mesh(part).values():
+            shared = {"shape": plan.parameters(shape_plan.source_of(part.shape[scenes[0].shape]))}
+            for task in (shape_plan.scene_task(part, one, kept) for one in scenes):
+                name = file_name(scenes[0])
+                yield Task(task, name=name, file=name, shared=shared, key=task["key"])
+
+
+STAGES = (
+    Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
+    Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
+    Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh", every=("reference",)),
+    Stage(
+        "calibrate",
+        "studies.kinds.bodies.calibrate",
+        lambda study: plan.calibrations(study).values(),
+        "curves",
+        every=("sensitivity",),
+    ),
+    Stage(
+        "solve",
+        "studies.kinds.bodies.solve",
+        _solve_tasks,
+        "solutions",
+        like="mesh",
+        every=("reference", "calibrate"),
+    ),
+)
