@@ -110,7 +110,7 @@ def _judged(name, dimensions, long_name):
     }
 
 
-VARIABLES = {
+EXPERIMENT_VARIABLES = {
     "dt_limit_predicted": (SCHEME, "s", "largest stable step, predicted", nan),
     "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", nan),
     "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", nan),
@@ -170,7 +170,7 @@ VARIABLES = {
     "experiment_message": (("experiment", "definition"), "1", "why an experiment has no results", ""),
 }
 
-DIMENSIONS: dict[str, str | tuple[str, str]] = {
+EXPERIMENT_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "integrator": "time integrator",
     "damper": "damping in proportion to mass, or of dampers along springs",
     "damping_ratio": "damping ratio of the highest mode",
@@ -203,8 +203,8 @@ KIND = Kind(
     expand=_expand,
     axes=_axes,
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
-    variables=VARIABLES,
-    dimensions=DIMENSIONS,
+    variables=EXPERIMENT_VARIABLES,
+    dimensions=EXPERIMENT_DIMENSIONS,
     flags={"behaviour": BEHAVIOURS},
     sparse=True,
     stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
