@@ -99,15 +99,6 @@ def write_study(text, folder):
     return path
 
 
-def patch(text, folder):
-    """Apply a diff of one file whose lines stand in one place, the first that they fit."""
-    header, _, lines = text.partition("\n@@\n")
-    path = folder / header.splitlines()[0].removeprefix("--- ")
-    before, after = ("".join(f"{line[1:]}\n" for line in lines.splitlines() if line[0] in (" ", side)) for side in "-+")
-    assert before in path.read_text(), f"{path.name} has no such lines:\n{before}"
-    path.write_text(path.read_text().replace(before, after, 1))
-
-
 def follow(page, folder, run=None):
     """Do what a page says, in a folder that has `config/`, and assert that it prints what it shows.
 
@@ -140,8 +131,6 @@ def follow(page, folder, run=None):
             compile(block.code, page.name, "exec")
         elif block.language == "toml":
             assert block.code in (REPOSITORY / "examples/plugin/pyproject.toml").read_text()
-        elif block.language == "diff":
-            patch(block.code, folder)
         else:
             assert block.language == "sh", block
             for line in block.code.splitlines():

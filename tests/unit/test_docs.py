@@ -34,7 +34,7 @@ SITE = sorted(
     if "```{" in page.read_text()
 )
 """Pages with directives, of the site alone: other pages do not lead to them. What the site generates has none."""
-PLACES = ("*.md", "config/*.md", "docs/*.md", "docs/tutorial/*.md", "docs/how-to/*.md", "workflow/profiles/*.md")
+PLACES = ("*.md", "config/*.md", "docs/*.md", "docs/how-to/*.md", "workflow/profiles/*.md")
 PAGES = sorted(path for pattern in PLACES for path in REPOSITORY.glob(pattern) if path not in SITE)
 
 
@@ -162,7 +162,7 @@ def test_study_of_the_readme_is_one(tmp_path):
 
 # -- what pages tell to type -------------------------------------------------------------------------------------------
 
-ELSEWHERE = {REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md", *REPOSITORY.glob("docs/tutorial/*.md")}
+ELSEWHERE = {REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md", REPOSITORY / "docs/tutorial.md"}
 """Pages that are followed below, by test_places.py and test_recipes.py, and by tests/workflow/test_tutorial.py."""
 
 FOLLOWED = [page for page in PAGES if page not in ELSEWHERE and any(blocks_of(page))]
