@@ -30,7 +30,7 @@ _NAMES = {
     "studies.kinds.laying.figures": ("plot_laying",),
     "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
     "studies.kinds.samples.figures": ("plot_sobol",),
-    "studies.kinds.bodies.figures": ("plot_block", "plot_deformed", "plot_sensitivity"),
+    "studies.kinds.bodies.beam_figures": ("plot_block", "plot_deformed", "plot_sensitivity"),
     "studies.kinds.bodies.errors": ("plot_size", "plot_sweep"),
     "studies.kinds.bodies.shape_figures": ("plot_shape", "plot_shape_errors", "plot_shapes"),
     "studies.kinds.stability.figures": ("plot_stability_maps", "plot_stability_strains"),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.kinds.bodies.plan import OF_OTHERS
+from springtune.studies.kinds.bodies.beam_plan import OF_OTHERS
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 

@@ -17,8 +17,8 @@ from PIL import Image
 
 import springtune as st
 from springtune.studies.config.kind import FORMATS, Output, outputs
-from springtune.studies.kinds.bodies import errors, figures
-from springtune.studies.kinds.bodies.figures import draw_curve
+from springtune.studies.kinds.bodies import beam_figures, errors
+from springtune.studies.kinds.bodies.beam_figures import draw_curve
 from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.output import present, style
 from springtune.studies.output.drawing import NETWORK_LINE
@@ -397,7 +397,7 @@ def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
     """Each says that it is linear; its files are those that the study declares."""
     root, curves = (tree[name].to_dataset().sel(kinematics=["linear"]) for name in ("/", "sensitivity"))
     linear = xr.DataTree.from_dict({"/": root, "/sensitivity": curves})
-    for drawers in (figures.sensitivity, errors.size):
+    for drawers in (beam_figures.sensitivity, errors.size):
         found = list(drawers(linear))
         assert [stem for stem, _, _ in found] == [stem for stem, _, _ in drawers(tree)]
         for _, plot, selection in found:

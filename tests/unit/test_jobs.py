@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from springtune.studies.kinds.bodies.plan import OF_OTHERS
+from springtune.studies.kinds.bodies.beam_plan import OF_OTHERS
 from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
 from springtune.studies.runs.source import STATE, hash_of, source_state

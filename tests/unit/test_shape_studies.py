@@ -15,7 +15,7 @@ from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies import mesh, stored
-from springtune.studies.kinds.bodies.expand import READ_AT_ONCE
+from springtune.studies.kinds.bodies.shape_expand import READ_AT_ONCE
 from springtune.studies.kinds.bodies.shape_plan import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.bodies.task_values import ONE_LOAD, geometry, named, shape_of
 from springtune.studies.kinds.bodies.task_values import load as values_of

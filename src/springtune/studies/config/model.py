@@ -182,7 +182,7 @@ class Study:
 
     @property
     def shapes(self) -> Any:
-        """Shapes that grids ask for, see `springtune.studies.kinds.bodies.expand.Shapes`; None if there are none."""
+        """What grids ask for of shapes, `springtune.studies.kinds.bodies.shape_expand.Shapes`; None without any."""
         return self.parts["bodies"]["shapes"] if self.parts["bodies"] else None
 
     def material(self, name: str) -> AnyMaterial:

@@ -17,7 +17,7 @@ from springtune.springs.lattice import predicted_stiffness
 from ...config.model import Reference, keeps_fields
 from ...output.selection import OF_FIELDS
 from ...runs import store
-from . import any_reference, plan, stored
+from . import any_reference, beam_plan, stored
 from .outputs import pressed
 from .rows import displaced, fields_of_rows, mesh_row, outline_row, with_objection
 from .stored import FIELD_ARRAYS, fields_key, stored_key
@@ -97,7 +97,7 @@ def _comment(data, answers):
 
 
 def _meshes(study, folder):
-    return [mesh.labels | stored.read_notes(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes]
+    return [mesh.labels | stored.read_notes(folder / "meshes", beam_plan.stem(mesh)) for mesh in study.meshes]
 
 
 def _references(study, answers):
@@ -120,7 +120,7 @@ def _references(study, answers):
 
 
 def _reference(study, folder, one, fields=()):
-    reference = plan.reference_of(study, one.beam, one.material, one.load)
+    reference = beam_plan.reference_of(study, one.beam, one.material, one.load)
     return any_reference.read(folder / "references", reference, fields)
 
 
@@ -134,13 +134,13 @@ def _scenes(study, folder, answers):
     }
     calibration = stored.read_calibration(folder)
     cells, faces, fields = [], [], []
-    for mesh, tasks in plan.scene_tasks(study).items():
+    for mesh, tasks in beam_plan.scene_tasks(study).items():
         keys = [stored_key(task, calibration) for task in tasks]
-        path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
+        path = folder / "solutions" / f"{beam_plan.stem(mesh)}.h5"
         results = store.read(path, set(keys), ["face_profile"] if pressed(study) else [])
         kept = {fields_key(key) for task, key in zip(tasks, keys) if keeps_fields(study) and "keep_fields" in task}
         arrays = store.read(path, kept, [*FIELD_ARRAYS]) if kept else {}
-        for scene, key in zip(plan.scenes_by_mesh(study)[mesh], keys):
+        for scene, key in zip(beam_plan.scenes_by_mesh(study)[mesh], keys):
             result, labels = results[key], study.labels(scene)
             against = objections[*(labels[name] for name in names), scene.kinematics]
             message = with_objection(result, result.get("message", ""), against)
@@ -166,9 +166,9 @@ def _printed(study):
 
 def _curves(study, folder, answers):
     """Rows of sensitivity curves."""
-    for mesh, curves in plan.curves_by_mesh(study).items():
-        tasks = [plan.curve_task(study, curve) for curve in curves]
-        path = folder / "curves" / f"{plan.stem(mesh)}.h5"
+    for mesh, curves in beam_plan.curves_by_mesh(study).items():
+        tasks = [beam_plan.curve_task(study, curve) for curve in curves]
+        path = folder / "curves" / f"{beam_plan.stem(mesh)}.h5"
         results = store.read(path, [task["key"] for task in tasks], ["displacement", "stable"])
         for curve, task in zip(curves, tasks):
             result, reference = results[task["key"]], Reference(mesh.beam, curve.material, curve.load, curve.force)
@@ -204,7 +204,7 @@ def _finite_references(study, folder):
 
 
 def _finite_reference(folder, one, kind, fields=()):
-    return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
+    return store.read_one(folder / "references", beam_plan.finite_key(one, kind), fields)
 
 
 def _compare(error, network, reference):
@@ -249,8 +249,10 @@ def _face_reference(study, folder, one, kind):
 
 def _at_rest(study, folder):
     """Rows of meshes, outlines, and references at the particles of the scenes whose fields are stored."""
-    shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
-    meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
+    shown = [scene for scene in study.scenes if scene in beam_plan.shown_scenes(study)]
+    meshes = {
+        mesh: stored.read(folder / "meshes", beam_plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)
+    }
     yield from (mesh.labels | mesh_row(found.mesh) for mesh, found in meshes.items() if found)
     compared = set()  # scenes differ in their definitions
     for scene in shown:

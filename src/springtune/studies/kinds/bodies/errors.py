@@ -8,7 +8,7 @@ from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import BEYOND_SMALL_STRAIN, in_words
 from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law, sign_of_errors
-from .figures import USUAL, by_beam, each, named, swept_words
+from .beam_figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 
 MOST_LINES = 6

@@ -16,17 +16,17 @@ from springtune.safe_io.tables import aligned
 
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study
+from .beam_plan import expected_solves, interpolants, reference_of
 from .outputs import OUTPUTS, OWN_FILE, stems
-from .plan import expected_solves, interpolants, reference_of
-from .sections import SHAPE_GRIDS_KEY, SHAPES_KEY
 from .shape_plan import by_mesh
+from .shape_sections import SHAPE_GRIDS_KEY, SHAPES_KEY
 from .stages import STAGES
 
 
 def _check(config, problems):
     if not (config.shapes or config.shape_grids):
         return
-    from .expand import check  # here, as below: most studies have no shapes
+    from .shape_expand import check  # here, as below: most studies have no shapes
 
     check(config, problems)
 
@@ -34,7 +34,7 @@ def _check(config, problems):
 def _expand(config, declared):
     if not config.shape_grids:
         return {"shapes": None}
-    from .expand import expand
+    from .shape_expand import expand
 
     return {"shapes": expand(config, declared)}
 

@@ -28,7 +28,7 @@ SWEPT_SHOWN = {
 }
 """What a study sweeps along an axis and in a column, and the unit there over that of the dataset."""
 
-PLOTS, ERROR_PLOTS = "studies.kinds.bodies.figures", "studies.kinds.bodies.errors"
+PLOTS, ERROR_PLOTS = "studies.kinds.bodies.beam_figures", "studies.kinds.bodies.errors"
 
 TABLE = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""

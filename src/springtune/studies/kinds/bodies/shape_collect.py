@@ -7,11 +7,10 @@ from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear
 
 from ...runs import store
-from . import shape_plan as plan
-from . import stored
-from .expand import law_of
+from . import shape_plan, stored
 from .outputs import CASE_AXES, DRAWING, MESH_AXES
 from .rows import displaced, fields_of_rows, mesh_row, outline_row, with_objection
+from .shape_expand import law_of
 from .stored import FIELD_ARRAYS, fields_key
 from .task_values import named, quantity_key
 from .variables import AT_FINITE_STRAIN, MESH_ROWS, SCENE_ROWS, SHAPE_FIELDS, SHAPES
@@ -29,7 +28,7 @@ def groups(study, folder):
 
 def _answer(part, folder, *case, arrays=()):
     """Stored result of a reference: of a shape, material and load, and a law at finite strain."""
-    return store.read_one(folder / "references", plan.reference_task(part, *case)["key"], arrays)
+    return store.read_one(folder / "references", shape_plan.reference_task(part, *case)["key"], arrays)
 
 
 def _quantities(part):
@@ -98,12 +97,12 @@ def _value(result, quantity):
 
 def _scenes(part, folder, answers):
     """Rows of meshes and scenes."""
-    for scenes in plan.by_mesh(part).values():
-        file = plan.file_name(scenes[0])
+    for scenes in shape_plan.by_mesh(part).values():
+        file = shape_plan.file_name(scenes[0])
         notes = stored.read_notes(folder / "meshes", file)
         labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
         yield labels | {name: notes[name] for name in MESH_ROWS if name in notes}
-        keys = {one: plan.scene_task(part, one)["key"] for one in scenes}
+        keys = {one: shape_plan.scene_task(part, one)["key"] for one in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
         for one, key in keys.items():
             yield from _scene(part, one, results[key], answers.get((one.shape, one.material, one.load)))
@@ -135,7 +134,7 @@ def _error(value, reference):
 def _fields(study, folder):
     """Group of the drawn networks."""
     part = study.shapes
-    drawn, cases = plan.shown(part), {}
+    drawn, cases = shape_plan.shown(part), {}
     for one in (one for one in part.scenes if one in drawn):
         cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
     rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(part, folder, scenes)]
@@ -144,7 +143,7 @@ def _fields(study, folder):
 
 def _drawn(part, folder, scenes):
     """Rows of a case: its labels, outline, mesh and networks."""
-    one, file = scenes[0], plan.file_name(scenes[0])
+    one, file = scenes[0], shape_plan.file_name(scenes[0])
     about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
     yield about | {"case_mesh_size": one.mesh_size}
     body = one.shape, one.material, one.load
@@ -156,7 +155,7 @@ def _drawn(part, folder, scenes):
             yield rounds | outline_row(found["outline_points"], found["outline_displacements"])
     if grouped := stored.read(folder / "meshes", file):
         yield mesh_row(grouped.mesh)
-        keys = {scene: fields_key(plan.scene_task(part, scene)["key"]) for scene in scenes}
+        keys = {scene: fields_key(shape_plan.scene_task(part, scene)["key"]) for scene in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()), [*FIELD_ARRAYS])
         for scene, key in keys.items():
             if results[key]:

@@ -6,8 +6,8 @@ from operator import attrgetter
 from ...runs import attempts
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
+from .beam_plan import file_source, parameters, particles_in
 from .outputs import OWN_FILE, mesh_name
-from .plan import file_source, parameters, particles_in
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""

@@ -3,20 +3,20 @@
 from ...config.kind import Stage
 from ...runs.plan import Task
 from ...runs.source import hash_of
-from . import plan, shape_plan
+from . import beam_plan, shape_plan
+from .beam_plan import expected_seconds, stem
 from .outputs import DRAWING
-from .plan import expected_seconds, stem
 from .shape_plan import file_name
 
 
 def _mesh_tasks(study):
     """Tasks of meshes, each with the expected seconds of all that is solved on it."""
-    curves, part = plan.curves_by_mesh(study), study.shapes
-    for mesh, scenes in plan.scenes_by_mesh(study).items():
-        count, name = plan.particles(mesh), stem(mesh)
+    curves, part = beam_plan.curves_by_mesh(study), study.shapes
+    for mesh, scenes in beam_plan.scenes_by_mesh(study).items():
+        count, name = beam_plan.particles(mesh), stem(mesh)
         seconds = (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
         seconds += sum(expected_seconds(count, scene.definition) for scene in scenes)
-        yield Task(plan.mesh_source(mesh), seconds=seconds, name=name, file=name, key=plan.mesh_key(mesh))
+        yield Task(beam_plan.mesh_source(mesh), seconds=seconds, name=name, file=name, key=beam_plan.mesh_key(mesh))
     for one, *others in shape_plan.by_mesh(part).values() if part else ():
         count, name = shape_plan.particles(part, one), file_name(one)
         seconds = sum(expected_seconds(count, scene.definition) for scene in (one, *others))
@@ -29,39 +29,39 @@ def _reference_tasks(study):
     found, part = {}, study.shapes
     for one in study.references:
         body = one.beam, one.material, one.load
-        if "interpolant" not in plan.reference_of(study, *body):
-            problem, key = plan.unit_problem_of(*body), plan.solved_reference(*body)["key"]
+        if "interpolant" not in beam_plan.reference_of(study, *body):
+            problem, key = beam_plan.unit_problem_of(*body), beam_plan.solved_reference(*body)["key"]
             name = hash_of(problem[0], problem[2])
             found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
         for kind in study.further_references:
-            values, key = plan.finite_problem(one, kind), plan.finite_key(one, kind)
+            values, key = beam_plan.finite_problem(one, kind), beam_plan.finite_key(one, kind)
             found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
     yield from found.values()
-    for kind, (box, problems) in plan.interpolants(study).items():
-        key = plan.interpolant_key(kind, box)
-        keys = {plan.solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+    for kind, (box, problems) in beam_plan.interpolants(study).items():
+        key = beam_plan.interpolant_key(kind, box)
+        keys = {beam_plan.solved_reference(*body)["key"]: problem for body, problem in problems.items()}
         values = {"kind": kind, "box": box, "problems": keys}
-        yield Task(values, seconds=3e-2 * plan.expected_solves(box), name=key, key=key)
+        yield Task(values, seconds=3e-2 * beam_plan.expected_solves(box), name=key, key=key)
     for one in (*part.referred, *part.finite) if part else ():
         task = shape_plan.reference_task(part, *one)
         yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
 
 
 def _curve_tasks(study):
-    for mesh, curves in plan.curves_by_mesh(study).items():
-        for task in (plan.curve_task(study, one) for one in curves):
+    for mesh, curves in beam_plan.curves_by_mesh(study).items():
+        for task in (beam_plan.curve_task(study, one) for one in curves):
             yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
 
 
 def _solve_tasks(study):
-    for mesh, tasks in plan.scene_tasks(study).items():
+    for mesh, tasks in beam_plan.scene_tasks(study).items():
         shared, name = {"beam": (mesh.beam.length, mesh.beam.height, mesh.beam.thickness)}, stem(mesh)
         for task in tasks:
             yield Task(task, name=name, file=name, shared=shared, key=task["key"])
     if part := study.shapes:
         kept = shape_plan.shown(part) if DRAWING in study.outputs else ()
         for scenes in shape_plan.by_mesh(part).values():
-            shared = {"shape": plan.parameters(shape_plan.source_of(part.shape[scenes[0].shape]))}
+            shared = {"shape": beam_plan.parameters(shape_plan.source_of(part.shape[scenes[0].shape]))}
             for task in (shape_plan.scene_task(part, one, kept) for one in scenes):
                 name = file_name(scenes[0])
                 yield Task(task, name=name, file=name, shared=shared, key=task["key"])
@@ -74,7 +74,7 @@ STAGES = (
     Stage(
         "calibrate",
         "studies.kinds.bodies.calibrate",
-        lambda study: plan.calibrations(study).values(),
+        lambda study: beam_plan.calibrations(study).values(),
         "curves",
         every=("sensitivity",),
     ),

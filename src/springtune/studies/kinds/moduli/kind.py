@@ -15,7 +15,7 @@ from ...config.kind import Kind, Stage
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
-from ..bodies.plan import expected_seconds, mesh_key, mesh_parameters, mesh_source, particles
+from ..bodies.beam_plan import expected_seconds, mesh_key, mesh_parameters, mesh_source, particles
 from .outputs import OUTPUTS
 
 
