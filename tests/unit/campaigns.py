@@ -12,6 +12,9 @@ from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import attempts, job, rerun
 from springtune.studies.runs.plan import plan
 
+EVERY = {"sensitivity": ("reference",), "calibrate": ("sensitivity",), "solve": ("reference", "calibrate")}
+"""Stages that a stage needs all jobs of, as the rules in ``workflow/rules/stages.smk`` have it."""
+
 
 def load_text(folder, text, name="study.yaml"):
     """Load a study from its text, or its bytes."""
@@ -59,7 +62,7 @@ class Campaign:
         stage, label = self.bundles[name].stage, self.bundles[name].label
         others = self.bundles.items()
         same = {other for other, job in others if job.stage.name == stage.like and job.label == label}
-        return same | {other for other, job in others if job.stage.name in stage.every}
+        return same | {other for other, job in others if job.stage.name in EVERY.get(stage.name, ())}
 
     def finish(self, last=None):
         """Run what is to run, as far as a job.

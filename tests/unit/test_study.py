@@ -31,6 +31,11 @@ SMALL = STUDIES["small"]
 changed = partial(study_text, "small")
 
 
+def mesh_name(mesh):
+    """Labels of a mesh in one word."""
+    return f"{mesh.beam.name}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm"
+
+
 # -- what a study asks for ---------------------------------------------------------------------------------------------
 
 
@@ -80,11 +85,11 @@ class TestExpansion:
 
     def test_names(self, load):
         study = load(changed(("[2 mm, 5 mm]", "[0.5 mm, 5 mm]")))
-        assert study.meshes[0].name == "long_structured_0.5mm"
+        assert mesh_name(study.meshes[0]) == "long_structured_0.5mm"
         assert [*study.labels(study.scenes[0]).values()] == [
             "long", "structured", 5e-4, "steel", "traction", "paper", "nonlinear"
         ]  # fmt: skip
-        assert len({mesh.name for mesh in study.meshes}) == len(study.meshes)
+        assert len(set(map(mesh_name, study.meshes))) == len(study.meshes)
         assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == len(study.scenes)
 
     def test_stiffness_ratios(self, load):
@@ -107,7 +112,7 @@ class TestExpansion:
     def test_merge_keys(self, load):
         text = SMALL.replace("  push:", "  push: &push") + "  push free:\n    <<: *push\n    mesh_type: free\n"
         grid = load(text).grids[-1]
-        assert [scene.mesh.name for scene in grid.scenes] == ["short_free_5mm"]
+        assert [mesh_name(scene.mesh) for scene in grid.scenes] == ["short_free_5mm"]
         assert not grid.curves
 
     def test_names_are_texts_whatever_yaml_makes_of_them(self, load):
@@ -117,7 +122,7 @@ class TestExpansion:
 class TestCalibrationCurves:
     def test_are_made_without_sensitivity(self, load):
         study = load(SMALL.replace("    kinematics: [nonlinear, linear]", "    sensitivity: false"))
-        assert [curve.mesh.name for curve in study.curves] == [
+        assert [mesh_name(curve.mesh) for curve in study.curves] == [
             "long_structured_2mm", "long_structured_5mm", "long_free_2mm", "long_free_5mm"
         ]  # fmt: skip
         assert not study.grids[0].curves
@@ -126,7 +131,7 @@ class TestCalibrationCurves:
         text = changed(("kinematics: [nonlinear, linear]", "kinematics: nonlinear"))
         text = text.replace("definition: lattice", "definition: calibrated\n    kinematics: linear")
         curves = [curve for curve in load(text).curves if curve.kinematics == "linear"]
-        assert [curve.mesh.name for curve in curves] == ["long_structured_2mm", "long_structured_5mm"]
+        assert [mesh_name(curve.mesh) for curve in curves] == ["long_structured_2mm", "long_structured_5mm"]
 
     def test_none_without_need(self, load):
         text = SMALL.replace("calibrated, ", "").replace(
@@ -268,7 +273,7 @@ class TestMeshFiles:
         study = load(study_text("small mesh_files"))
         short = Beam(0.1, 0.02, 0.002, "short")
         mesh = MeshSpec(short, "own", 0.003, tmp_path / "own.msh", 1e-3)
-        assert study.meshes[-1] == mesh and mesh.name == "short_own_3mm"
+        assert study.meshes[-1] == mesh and mesh_name(mesh) == "short_own_3mm"
         assert study.axes["mesh_type"] == ("structured", "free", "own")
         assert study.mesh_files == {("own", "short", 0.003): mesh}
 

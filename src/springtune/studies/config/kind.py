@@ -95,15 +95,14 @@ class Stage:
     name : str
         Name of the rule, and first part of the names of its files.
     module : str
-        Module that does one task, from the package on, see `springtune.studies.runs.job`.
+        Module that does one task, from the package on, see `springtune.studies.runs.attempts`.
     tasks : callable
         From a study to its tasks, see `springtune.studies.runs.plan.Task`.
     folder : str
         Folder of its files, within the study's folder; by default its name.
     like : str
-        Stage whose bundles it shares, and whose job of the same bundle it needs.
-    every : tuple of str
-        Stages that it needs all jobs of, besides the job of the same bundle.
+        Stage whose bundles it shares, and whose job of the same bundle it needs. All else that a job needs is input of
+        its rule in ``workflow/rules/stages.smk``.
     alone : bool
         Whether a job has the tasks of one name and the whole machine, so that its seconds can be measured.
     endings : tuple of str
@@ -115,7 +114,6 @@ class Stage:
     tasks: Callable[[Study], Iterable[Any]]
     folder: str = ""
     like: str = ""
-    every: tuple[str, ...] = ()
     alone: bool = False
     endings: tuple[str, ...] = (".h5",)
 

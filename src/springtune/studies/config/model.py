@@ -50,11 +50,6 @@ class MeshSpec:
         # Plans look meshes up a hundred thousand times.
         return self._hash
 
-    @property
-    def name(self) -> str:
-        """File stem, e.g. ``"200x40_structured_5mm"``."""
-        return f"{self.beam.name}_{self.mesh_type}_{1e3 * self.mesh_size:g}mm"
-
     @cached_property
     def labels(self) -> Labels:
         """Labels of its cell of the dataset."""

@@ -20,7 +20,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import FEWER, check_able, check_density, check_particles
 from ...config.expand import file_fault
-from .outputs import MADE, OWN_FILE, mesh_name
+from .outputs import MADE, OWN_FILE
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,6 @@ class ShapeScene:
     load: str
     definition: str
     kinematics: str
-
-    @property
-    def name(self) -> str:
-        """Readable name, unique in the study, such as ``"cook_free_4mm_third_shear_lattice_linear"``."""
-        return "_".join((mesh_name(self), self.material, self.load, self.definition, self.kinematics))
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,10 @@ def _curve_tasks(study):
             yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
 
 
+def _calibration_tasks(study):
+    return beam_plan.calibrations(study).values()
+
+
 def _solve_tasks(study):
     for mesh, tasks in beam_plan.scene_tasks(study).items():
         shared, name = {"beam": (mesh.beam.length, mesh.beam.height, mesh.beam.thickness)}, stem(mesh)
@@ -70,20 +74,7 @@ def _solve_tasks(study):
 STAGES = (
     Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
     Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
-    Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh", every=("reference",)),
-    Stage(
-        "calibrate",
-        "studies.kinds.bodies.calibrate",
-        lambda study: beam_plan.calibrations(study).values(),
-        "curves",
-        every=("sensitivity",),
-    ),
-    Stage(
-        "solve",
-        "studies.kinds.bodies.solve",
-        _solve_tasks,
-        "solutions",
-        like="mesh",
-        every=("reference", "calibrate"),
-    ),
+    Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh"),
+    Stage("calibrate", "studies.kinds.bodies.calibrate", _calibration_tasks, "curves"),
+    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh"),
 )
