@@ -79,4 +79,4 @@ def test_a_run_with_holes_says_a_line_for_each_stage(tmp_path, repository):
 
     code, text = run()
     assert code == 0, text
-    assert "Select jobs" not in text and text.count("\nMeshing: done; ") == 1
+    assert "Select jobs" not in text and text.count("\nmesh: done; ") == 1

@@ -53,7 +53,7 @@ def results(run):
     run.write("hostile.yaml", STUDY)
     code, output = run.snakemake("hostile.yaml")
     assert code == 0 and HOSTILE in output, output
-    assert "Select jobs" not in output and output.count("\nMeshing: done; ") == 1  # as of `springtune run`
+    assert "Select jobs" not in output and output.count("\nmesh: done; ") == 1  # as of `springtune run`
     return run.folder / "results/hostile"
 
 

@@ -97,11 +97,11 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
 
 def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp_path):
     """The package in a copy, with an error that scenes in traction run into."""
-    line = "        problem = self.problem(kind, springs, follower)\n"
+    line = "        problem, first = sheet.problem(self.loading, springs), self.case.quantities[0]\n"
     shutil.copytree(Path(springtune.__file__).parent, tmp_path / "springtune")
-    path = tmp_path / "springtune/scene/sheet.py"
+    path = tmp_path / "springtune/scene/statements.py"
     assert path.read_text().count(line) == 1
-    path.write_text(path.read_text().replace(line, f"{line}        None if force < 0 else None + force\n"))
+    path.write_text(path.read_text().replace(line, f"{line}        None if self.force < 0 else None + self.force\n"))
     run.write("broken.yaml", STUDY)
     code, output = run.snakemake("broken.yaml", package=tmp_path)
     assert code == 1 and "Traceback" not in output
