@@ -358,10 +358,10 @@ def _advice(root):
             situation = ""
     if not rows:
         return []
-    meshes = "; ".join(", ".join(f"{beam} at {1e3 * size:g} mm" for beam, size in seen[one]) for one in sorted(seen))
-    said = "Each line is the range over all meshes of the study up to its a/H and beyond that of the line before"
+    meshes = (", ".join(f"{beam} at {1e3 * size:g} mm" for beam, size in seen[one]) for one in sorted(seen))
+    said = "Each line is the range over the meshes of its a/H, from the finest to the coarsest"
     lines = markdown_table(list(rows[0]), [list(row.values()) for row in rows], 4)
-    return [*markdown_section("In short"), *lines, "", f"{said}: {meshes}.", ""]
+    return [*markdown_section("In short"), *lines, "", f"{said}: {'; '.join(meshes)}.", ""]
 
 
 def _range(cells):
