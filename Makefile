@@ -115,7 +115,7 @@ $(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/test.
 $(VENV)/.test: requirements/test.txt $(VENV)/.run
 	sh tools/setup.sh test
 
-# Versions and hashes of all packages, and their licences in docs/licences.md. uv does not read pip's configuration, so the
+# Versions and hashes of all packages, and their licences in docs/licences.csv. uv does not read pip's configuration, so the
 # indexes, where pip has some of its own, are handed on, and are equal, as to pip.
 LOCK = uv pip compile --quiet --index-strategy unsafe-best-match --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
 lock: export UV_DEFAULT_INDEX ?= $(shell pip config get global.index-url 2>/dev/null)

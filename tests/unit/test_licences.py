@@ -22,7 +22,7 @@ def licences():
     return module
 
 
-def test_the_page_is_what_the_lock_files_ask_for(licences):
+def test_the_table_is_what_the_lock_files_ask_for(licences):
     licences.main(check=True)
 
 
