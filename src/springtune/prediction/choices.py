@@ -350,7 +350,10 @@ def beam_statements(
     """Statements of 1 N in linear kinematics, one for each load."""
     is_a(mesh, Mesh, "mesh", A_MESH)
     is_a(material, Material, "material", A_MATERIAL)
-    return [BeamStatement(beam, mesh, material, load, 1.0, "linear") for load in check_loads(loads)]
+    found: list[BeamStatement] = []
+    for load in check_loads(loads):
+        found.append(BeamStatement(beam, mesh, material, load, 1.0, "linear", found[0].sheet if found else None))
+    return found
 
 
 def as_sure_as(known: Mapping[str, Any]) -> float:
@@ -452,7 +455,8 @@ class Trial:
     ) -> None:
         self.statements, self.known, first = statements, known, statements[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
-        self._sheet = Sheet(self.mesh, self.thickness, networks=len({one.loading.held.tobytes() for one in statements}))
+        self._sheet = first.sheet
+        self._sheet.networks = len({one.loading.held.tobytes() for one in statements})
         self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}

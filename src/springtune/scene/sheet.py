@@ -135,6 +135,8 @@ class Sheet:
         Beams that the mesh is known to fill.
     deriving : float
         Seconds spent on deriving springs so far.
+    networks : int
+        Networks that are kept at a time.
     references : dict
         Solved references of load cases of a shape.
 
@@ -158,7 +160,7 @@ class Sheet:
         self.loaded = cache(lambda kind: loaded_box(mesh, kind))
         self.filled: set[Beam] = set()
         self.references: dict[tuple[object, ...], Any] = {}
-        self._most = networks
+        self.networks = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
         shared = like is not None and mesh.shares_cells(like.mesh)
         self._patterns: dict[bytes, Network] = dict(like._patterns) if like is not None and shared else {}
@@ -223,7 +225,7 @@ class Sheet:
             network = Network(self.mesh, directions, springs.relative, springs.energies, like)
             problems = {}
             self._patterns.setdefault(directions.tobytes(), network)
-        while len(self._networks) >= self._most:
+        while len(self._networks) >= self.networks:
             self._networks.pop(next(iter(self._networks)))
         self._networks[name] = network, problems  # the last one used is dropped last
         return network, problems
