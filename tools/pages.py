@@ -97,11 +97,8 @@ def by_mesh_type(tables: str) -> str:
 
 
 def in_engines(data: xr.Dataset) -> str:
-    """Table of each scene: solver error over substeps, and the setting of least work that is converged."""
-    return "\n".join(f"**{scene.item()}**\n\n{_of_scene(data.sel(scene=scene))}" for scene in data.scene)
-
-
-def _of_scene(data: xr.Dataset) -> str:
+    """Return the table of the sheet: solver error over substeps, and the converged setting of least work."""
+    data = data.sel(scene="sheet")
     data = data.isel(substeps=(data.engine_status != 0).any([one for one in data.dims if one != "substeps"]).values)
     head = ["engine", "definition", *(f"{n} substep{'s' if n > 1 else ''}" for n in data.substeps.values)]
     head += ["converged from", "ms a frame"]
