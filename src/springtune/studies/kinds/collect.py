@@ -46,12 +46,12 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
 
 
 def group_of(kind: "Kind") -> dataset.Group:
-    """Group of a kind whose tasks have cells of it."""
+    """Group that a kind without a module ``collect`` declares."""
     return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions, kind.flags)
 
 
 def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
-    """Group of a kind whose tasks have cells of it."""
+    """Group of such a kind, of the stored rows of its stages."""
     group, found = group_of(kind), [row for stage in kind.stages for row in rows(stage, study, folder)]
     names = {name for row in found for name in row} if kind.sparse else None
     return {group.name: group.of_rows(study.axes, found, names).assign_attrs(kind.attributes(study.parts[kind.name]))}

@@ -1,6 +1,7 @@
-"""Find the jobs that a run has to do: those never done, with another request, or with missing products.
+"""All jobs of a study, and those that a run has to do: never done, with another request, or with missing products.
 
-Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are defined here.
+Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are defined here: the dataset, the figures
+and tables, the page to browse and the paper.
 """
 
 from collections.abc import Iterable

@@ -1,4 +1,7 @@
-"""Find the workflow: in the source tree around the package, else in the package itself, as a wheel has it."""
+"""Where the workflow and files of studies are, and hashes and notes by which runs know what changed.
+
+The workflow is in the source tree around the package, else in the package itself, as a wheel has it.
+"""
 
 import hashlib
 import json

@@ -1,6 +1,7 @@
 """Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``.
 
-And the summary of a study before it runs. Sections of beams are in `springtune.studies.config.sections`.
+The part of this kind in a study has its shapes alone, or None: meshes, scenes, curves and references of beams are
+attributes of `springtune.studies.config.model.Study`. `summary` describes a study before it runs.
 """
 
 from collections import Counter

@@ -13,7 +13,6 @@ from springtune.problem.materials import Rubber, material_of
 
 from ...runs.attempts import solve_files
 from . import unit_references
-from .unit_references import make_interpolant, solve_unit_problem
 
 failed = unit_references.failed
 
@@ -28,7 +27,7 @@ def run(content, attempts):
     others = [file for file in content["files"] if "box" not in file["tasks"][0]]
     solve_files(sys.modules[__name__], content | {"files": others}, attempts)
     for task in (task for file in content["files"] for task in file["tasks"] if "box" in task):
-        make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, attempts)
+        unit_references.make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, attempts)
 
 
 def solve(task):
@@ -37,7 +36,7 @@ def solve(task):
     if "shape" in task:
         from .shape_reference import solve as solve_task  # here: most studies have no shapes
     else:
-        solve_task = _finite if "law" in task else solve_unit_problem
+        solve_task = _finite if "law" in task else unit_references.solve_unit_problem
     return solve_task(task) | {"seconds": time.perf_counter() - begin}
 
 

@@ -16,14 +16,13 @@ from springtune.reference.answers import objection
 from springtune.scene.curve import ending, follow, meeting
 from springtune.scene.sheet import Sheet
 
-from . import any_reference as references
-from . import stored
+from . import any_reference, stored
 
 
-def prepare(family, content):
+def prepare(file, content):
     """Sheet of a mesh, and the folder of references."""
     # Curves depend on stiffnesses alone, so the thickness is 1 m.
-    return Sheet(stored.prepared(content, family).mesh, 1.0), Path(content["results"]) / "references"
+    return Sheet(stored.prepared(content, file).mesh, 1.0), Path(content["results"]) / "references"
 
 
 def failed(curve, why):
@@ -52,7 +51,7 @@ def solve(curve, shared):
 def _result(path, curve, folder):
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
     displacement, stable = path.values, path.stable
-    reference = references.read(folder, curve["reference"])
+    reference = any_reference.read(folder, curve["reference"])
     why = objection(reference, force, curve["kinematics"])
     wanted = force * reference.get("displacement", np.nan)
     best = meeting(path, force, stiffness, displacement, stable, wanted, why)

@@ -26,22 +26,22 @@ from .stored import stored_key
 parts = stored.parts
 
 
-def tasks(family, content):
+def tasks(file, content):
     """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
-    if not any("calibration" in scene for scene in family["tasks"]):
-        return family["tasks"]
+    if not any("calibration" in scene for scene in file["tasks"]):
+        return file["tasks"]
     calibration = stored.read_calibration(content["results"])
     return [
         scene | {"key": stored_key(scene, calibration), "calibrated": calibration.get(scene.get("calibration"))}
-        for scene in family["tasks"]
+        for scene in file["tasks"]
     ]
 
 
-def prepare(family, content):
-    """Function that solves the scenes of one mesh; ``family`` is a file of a job, see `springtune.studies.runs.job`."""
-    grouped = stored.prepared(content, family)
-    if "shape" in family:
-        return partial(solve_shape, family["shape"], grouped, {})
+def prepare(file, content):
+    """Function that solves the scenes of one mesh, see `springtune.studies.runs.attempts`."""
+    grouped = stored.prepared(content, file)
+    if "shape" in file:
+        return partial(solve_shape, file["shape"], grouped, {})
     mesh, labels = grouped.mesh, ("x", "y", "displacements")
 
     @cache
@@ -55,7 +55,7 @@ def prepare(family, content):
         unit = for_one(reference["key"], reference["length"])
         return None if unit is None else reference["displacement"] * unit
 
-    beam = Beam(*family["beam"])
+    beam = Beam(*file["beam"])
     return partial(solve_beam, beam, Sheet(mesh, beam.thickness), field)
 
 

@@ -71,12 +71,12 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     return store.read(files(folder, name)[1], [NOTES])[NOTES]
 
 
-def prepared(content: dict[str, Any], family: dict[str, Any]) -> GroupedMesh:
+def prepared(content: dict[str, Any], file: dict[str, Any]) -> GroupedMesh:
     """Mesh of the tasks of a file."""
     folder = Path(content["results"]) / "meshes"
-    if found := read(folder, family["name"]):
+    if found := read(folder, file["name"]):
         return found
-    raise RefusedError(read_notes(folder, family["name"])["message"].removeprefix("mesh: "))
+    raise RefusedError(read_notes(folder, file["name"])["message"].removeprefix("mesh: "))
 
 
 def read(folder: str | Path, name: str) -> GroupedMesh | None:
