@@ -1,4 +1,6 @@
-"""Meshes of a beam: their types, quality and files.
+"""Meshes of beams and shapes: their types, quality, checks, named groups and files.
+
+`rows` and `free` mesh beams, `outlines` shapes, and `formats` reads and writes files.
 
 The decorator `mesh_type` declares a function that meshes a box; `MESH_TYPES` finds all that this package's modules
 and the user declare.

@@ -1,4 +1,4 @@
-"""Geometry of the bodies that a study asks for."""
+"""Beams, strips and trapezoids, and warnings about the thickness and the size of any body."""
 
 import warnings
 from collections.abc import Iterable
