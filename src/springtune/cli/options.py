@@ -126,7 +126,7 @@ def asked_material(given: Mapping[str, Any]) -> "Material":
 
 
 def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
-    """Study, its part of shapes, and the shape of a text such as ``config/shapes.yaml:cook``."""
+    """Study, its shapes, and the shape of a text such as ``config/shapes.yaml:cook``."""
     from ..problem.quantities import nearest
     from ..studies.kinds import load_study
 
@@ -134,13 +134,13 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
     if not Path(path).is_file() or Path(path).suffix not in (".yaml", ".yml"):
         raise ValueError(f"study: '{text}': there is no study {path or text}; give one such as {STUDY_EXAMPLE}")
     study = load_study(path)
-    part = study.shapes
-    known = list(part.shape) if part else []
+    shapes = study.shapes
+    known = list(shapes.shape) if shapes else []
     if not name and len(known) == 1:
         (name,) = known
     if name not in known:
         raise ValueError(f"study: '{text}' names none of its shapes; give such as {path}:name; {nearest(name, known)}")
-    return study, part, study.shape(name)
+    return study, shapes, study.shape(name)
 
 
 @dataclass(frozen=True)
@@ -218,13 +218,13 @@ def _asked_shape(given: Mapping[str, Any], load: str | None, sized: bool) -> Ask
     """Shape of a study; load and material may be None if the study has only one for it."""
     from ..problem.quantities import nearest
 
-    study, part, shape = shape_of_study(given["study"])
+    study, shapes, shape = shape_of_study(given["study"])
     if load is None and len(shape.loads) > 1:
         raise ValueError(f"load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")
     load = next(iter(shape.loads)) if load is None else load
     if load not in shape.loads:
         raise ValueError(f"load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
-    used = {one.material for one in part.scenes if one.shape == shape.name} or {*study.materials}
+    used = {one.material for one in shapes.scenes if one.shape == shape.name} or {*study.materials}
     if given["material"] is None and len(used) > 1:
         known = ", ".join(one for one in study.materials if one in used)
         raise ValueError(f"material: missing; the study has {known} for shape '{shape.name}'; give one")
@@ -239,7 +239,7 @@ def _asked_shape(given: Mapping[str, Any], load: str | None, sized: bool) -> Ask
         materials = {
             name: replace(one, density=density) if one.density is None else one for name, one in materials.items()
         }
-    size, files = _size(given, needed=sized and not shape.file), part.files[shape.name]
+    size, files = _size(given, needed=sized and not shape.file), shapes.files[shape.name]
     if shape.file and (size is not None or sized and len(files) > 1):
         chosen = [file for other, file in files.items() if size is not None and math.isclose(size, other)]
         if not chosen:
@@ -247,7 +247,7 @@ def _asked_shape(given: Mapping[str, Any], load: str | None, sized: bool) -> Ask
             which = f"files of {sizes}; give one" if sizes else "one mesh; leave --size out"
             raise ValueError(f"size: {given['size'] or 'missing'}; '{shape.name}' has {which}")
         shape, size = replace(shape, file=chosen[0]), None
-    make = partial(_shape_mesh, shape, part.refined[shape.name])
+    make = partial(_shape_mesh, shape, shapes.refined[shape.name])
     return Asked(shape, materials, load, shape.file or "free", size, make)
 
 

@@ -34,19 +34,20 @@ def _check(config, problems):
 
 def _expand(config, declared):
     if not config.shape_grids:
-        return {"shapes": None}
+        return {"shapes": None}  # and not empty: a study with grids has this kind
     from .shape_expand import expand
 
     return {"shapes": expand(config, declared)}
 
 
 def _axes(found):
-    part = found["shapes"]
-    if not part:
+    shapes = found["shapes"]
+    if not shapes:
         return {}
-    labels = {name: tuple(dict.fromkeys(getattr(one, name) for one in part.scenes)) for name in vars(part.scenes[0])}
-    pairs = dict.fromkeys((one.shape, one.load) for one in part.scenes)
-    asked = [one.name for shape, load in pairs for one in part.shape[shape].loads[load].quantities]
+    scenes = shapes.scenes
+    labels = {name: tuple(dict.fromkeys(getattr(one, name) for one in scenes)) for name in vars(scenes[0])}
+    pairs = dict.fromkeys((one.shape, one.load) for one in scenes)
+    asked = [one.name for shape, load in pairs for one in shapes.shape[shape].loads[load].quantities]
     return labels | {"quantity": tuple(dict.fromkeys(asked))}
 
 
@@ -64,28 +65,28 @@ def _size(shape, file):
 
 
 def _summary(found):
-    part = found["shapes"]
-    if not part:
+    shapes = found["shapes"]
+    if not shapes:
         return []
-    sizes = Counter((one.shape, one.mesh_size * (one.mesh_type == OWN_FILE)) for one in part.scenes)
-    cases = {(one.shape, one.load) for one in part.scenes}
-    quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
-    used = {one.shape for one in part.scenes}
-    shapes = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(by_mesh(part))} meshes"
-    rows = [["shape scenes", len(part.scenes), f"of {shapes}, {quantities} quantities"]]
+    sizes = Counter((one.shape, one.mesh_size * (one.mesh_type == OWN_FILE)) for one in shapes.scenes)
+    cases = {(one.shape, one.load) for one in shapes.scenes}
+    quantities = sum(len(shapes.shape[shape].loads[load].quantities) for shape, load in cases)
+    used = {one.shape for one in shapes.scenes}
+    words = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(by_mesh(shapes))} meshes"
+    rows = [["shape scenes", len(shapes.scenes), f"of {words}, {quantities} quantities"]]
     rows += [
-        [f"  {name}", count, _size(part.shape[name], part.files[name].get(size, ""))]
+        [f"  {name}", count, _size(shapes.shape[name], shapes.files[name].get(size, ""))]
         for (name, size), count in sizes.items()
     ]
-    if count := len(part.referred) + len(part.finite):
+    if count := len(shapes.referred) + len(shapes.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
 
 
 def _files(found):
-    part = found["shapes"] if found else None
-    used = dict.fromkeys(one.shape for one in part.scenes) if part else ()
-    return [Path(file) for shape in used for file in part.files[shape].values()]
+    shapes = found["shapes"] if found else None
+    used = dict.fromkeys(one.shape for one in shapes.scenes) if shapes else ()
+    return [Path(file) for shape in used for file in shapes.files[shape].values()]
 
 
 KIND = Kind(

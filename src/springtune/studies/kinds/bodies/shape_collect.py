@@ -18,33 +18,33 @@ from .variables import AT_FINITE_STRAIN, MESH_ROWS, SCENE_ROWS, SHAPE_FIELDS, SH
 
 def groups(study, folder):
     """Groups of shapes."""
-    part = study.shapes
-    answers = {case: _answer(part, folder, *case) for case in part.referred}
-    rows = [*_quantities(part), *_references(study.axes, part, answers), *_scenes(part, folder, answers)]
+    shapes = study.shapes
+    answers = {case: _answer(shapes, folder, *case) for case in shapes.referred}
+    rows = [*_quantities(shapes), *_references(study.axes, shapes, answers), *_scenes(shapes, folder, answers)]
     data = SHAPES.of_rows(study.axes, rows)
-    finite = {AT_FINITE_STRAIN.name: _finite_strain(study, part, folder, data.value)} if part.finite else {}
+    finite = {AT_FINITE_STRAIN.name: _finite_strain(study, shapes, folder, data.value)} if shapes.finite else {}
     return {SHAPES.name: data} | finite | (_fields(study, folder) if DRAWING in study.outputs else {})
 
 
-def _answer(part, folder, *case, arrays=()):
+def _answer(shapes, folder, *case, arrays=()):
     """Stored result of a reference: of a shape, material and load, and a law at finite strain."""
-    return store.read_one(folder / "references", shape_plan.reference_task(part, *case)["key"], arrays)
+    return store.read_one(folder / "references", shape_plan.reference_task(shapes, *case)["key"], arrays)
 
 
-def _quantities(part):
+def _quantities(shapes):
     """Rows of what quantities are."""
-    for shape, load in dict.fromkeys((one.shape, one.load) for one in part.scenes):
-        yield {"shape": shape, "shape_thickness": part.shape[shape].thickness}
-        for one in part.shape[shape].loads[load].quantities:
+    for shape, load in dict.fromkeys((one.shape, one.load) for one in shapes.scenes):
+        yield {"shape": shape, "shape_thickness": shapes.shape[shape].thickness}
+        for one in shapes.shape[shape].loads[load].quantities:
             about = {f"quantity_{name}": getattr(one, name) for name in ("kind", "component", "of")}
             about |= {"quantity_units": QUANTITY_UNITS[one.kind], "source": one.source, "expected_value": one.expected}
             yield {"shape": shape, "load": load, "quantity": one.name} | about
 
 
-def _whys(part, shape, load, result):
+def _whys(shapes, shape, load, result):
     """Why a reference, or a quantity of it, is missing, in the names of the study."""
     whys = (result["message"], *result.get("lacking", {}).values())
-    return [named(why, part.shape[shape], part.shape[shape].loads[load]) for why in whys if why]
+    return [named(why, shapes.shape[shape], shapes.shape[shape].loads[load]) for why in whys if why]
 
 
 def _objection(result, kinematics):
@@ -52,39 +52,39 @@ def _objection(result, kinematics):
     return "" if result["message"] or kinematics == "linear" else beyond_linear(result["rotation"], result["strain"])
 
 
-def _references(axes, part, answers):
+def _references(axes, shapes, answers):
     """Rows of references."""
     for (shape, material, load), result in answers.items():
         labels = {"shape": shape, "material": material, "load": load}
-        whys = [*_whys(part, shape, load, result), _objection(result, "nonlinear")]
+        whys = [*_whys(shapes, shape, load, result), _objection(result, "nonlinear")]
         yield labels | {"reference_seconds": result["seconds"], "reference_message": "; ".join(filter(None, whys))}
         if result["message"]:
             continue
         yield labels | {f"reference_{name}": result[name] for name in ("unknowns", "rotation", "strain")}
         for kinematics in axes["kinematics"]:
             yield labels | {"kinematics": kinematics, "reference_applies": not _objection(result, kinematics)}
-        for one in part.shape[shape].loads[load].quantities:
+        for one in shapes.shape[shape].loads[load].quantities:
             row = labels | {"quantity": one.name} | _value(result, one)
             yield row | {"reference_expected_error": _error(row["reference_value"], one.expected)}
 
 
-def _finite_strain(study, part, folder, values):
+def _finite_strain(study, shapes, folder, values):
     """Group of references at finite strain, and the errors of the networks with their law."""
     rows, references = [], {}
-    for shape, material, load, law in part.finite:
-        result = _answer(part, folder, shape, material, load, law)
+    for shape, material, load, law in shapes.finite:
+        result = _answer(shapes, folder, shape, material, load, law)
         labels = {"shape": shape, "material": material, "load": load, "law": law}
         references[shape, material, load, law] = result.get("values", {})
-        rows.append(labels | {"reference_message": "; ".join(_whys(part, shape, load, result))})
-        for one in part.shape[shape].loads[load].quantities if not result["message"] else ():
+        rows.append(labels | {"reference_message": "; ".join(_whys(shapes, shape, load, result))})
+        for one in shapes.shape[shape].loads[load].quantities if not result["message"] else ():
             rows.append(labels | {"quantity": one.name} | _value(result, one))
-    for one in part.scenes:
+    for one in shapes.scenes:
         reference = references.get((one.shape, one.material, one.load, law_of(one)), {})
-        for quantity in part.shape[one.shape].loads[one.load].quantities if reference else ():
+        for quantity in shapes.shape[one.shape].loads[one.load].quantities if reference else ():
             labels = vars(one) | {"quantity": quantity.name}
             error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
             rows.append(labels | {"error": error})
-    laws = tuple(dict.fromkeys(law for *_, law in part.finite))
+    laws = tuple(dict.fromkeys(law for *_, law in shapes.finite))
     return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
@@ -95,26 +95,26 @@ def _value(result, quantity):
     return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
 
 
-def _scenes(part, folder, answers):
+def _scenes(shapes, folder, answers):
     """Rows of meshes and scenes."""
-    for scenes in shape_plan.by_mesh(part).values():
+    for scenes in shape_plan.by_mesh(shapes).values():
         file = shape_plan.file_name(scenes[0])
         notes = stored.read_notes(folder / "meshes", file)
         labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
         yield labels | {name: notes[name] for name in MESH_ROWS if name in notes}
-        keys = {one: shape_plan.scene_task(part, one)["key"] for one in scenes}
+        keys = {one: shape_plan.scene_task(shapes, one)["key"] for one in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
         for one, key in keys.items():
-            yield from _scene(part, one, results[key], answers.get((one.shape, one.material, one.load)))
+            yield from _scene(shapes, one, results[key], answers.get((one.shape, one.material, one.load)))
 
 
-def _scene(part, one, result, reference):
+def _scene(shapes, one, result, reference):
     """Rows of a scene."""
-    labels, case, whys = vars(one), part.shape[one.shape].loads[one.load], []
+    labels, case, whys = vars(one), shapes.shape[one.shape].loads[one.load], []
     if reference:
-        whys = [f"no reference: {why}" for why in _whys(part, one.shape, one.load, reference)]
+        whys = [f"no reference: {why}" for why in _whys(shapes, one.shape, one.load, reference)]
         whys.append(_objection(reference, one.kinematics))
-    message = named(result.get("message", ""), part.shape[one.shape], case)
+    message = named(result.get("message", ""), shapes.shape[one.shape], case)
     message = with_objection(result, message, "; ".join(filter(None, whys)))
     values = {name: result[name] for name in SCENE_ROWS if name in result}
     yield labels | values | {"solve_seconds": result["seconds"], "message": message}
@@ -133,29 +133,29 @@ def _error(value, reference):
 
 def _fields(study, folder):
     """Group of the drawn networks."""
-    part = study.shapes
-    drawn, cases = shape_plan.shown(part), {}
-    for one in (one for one in part.scenes if one in drawn):
+    shapes = study.shapes
+    drawn, cases = shape_plan.shown(shapes), {}
+    for one in (one for one in shapes.scenes if one in drawn):
         cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
-    rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(part, folder, scenes)]
+    rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(shapes, folder, scenes)]
     return {SHAPE_FIELDS.name: fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)}
 
 
-def _drawn(part, folder, scenes):
+def _drawn(shapes, folder, scenes):
     """Rows of a case: its labels, outline, mesh and networks."""
     one, file = scenes[0], shape_plan.file_name(scenes[0])
     about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
     yield about | {"case_mesh_size": one.mesh_size}
     body = one.shape, one.material, one.load
-    if body in part.referred:
-        found = _answer(part, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths"))
+    if body in shapes.referred:
+        found = _answer(shapes, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths"))
         if not found["message"]:
             sizes = found["outline_lengths"]
             rounds = {"outline_round": np.repeat(np.arange(len(sizes)), sizes)}
             yield rounds | outline_row(found["outline_points"], found["outline_displacements"])
     if grouped := stored.read(folder / "meshes", file):
         yield mesh_row(grouped.mesh)
-        keys = {scene: fields_key(shape_plan.scene_task(part, scene)["key"]) for scene in scenes}
+        keys = {scene: fields_key(shape_plan.scene_task(shapes, scene)["key"]) for scene in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()), [*FIELD_ARRAYS])
         for scene, key in keys.items():
             if results[key]:

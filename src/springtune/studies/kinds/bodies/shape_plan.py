@@ -21,9 +21,9 @@ def file_name(one):
     return f"shape_{mesh_name(one)}"
 
 
-def particles(part, one):
+def particles(shapes, one):
     """Approximate number of particles of a scene's mesh."""
-    shape = part.shape[one.shape]
+    shape = shapes.shape[one.shape]
     return FILE_PARTICLES if shape.file else particles_in(shape.area, one.mesh_size)
 
 
@@ -37,19 +37,19 @@ def source_of(shape, file=""):
     return geometry(shape) | (file_source(file or shape.file, shape.unit) if shape.file else {})
 
 
-def mesh_source(part, one):
+def mesh_source(shapes, one):
     """Source of a scene's mesh."""
-    source = source_of(part.shape[one.shape], part.files[one.shape].get(one.mesh_size, ""))
+    source = source_of(shapes.shape[one.shape], shapes.files[one.shape].get(one.mesh_size, ""))
     if "file" in source:
         return source
-    refined = {name: share * one.mesh_size for name, share in part.refined[one.shape].items()}
+    refined = {name: share * one.mesh_size for name, share in shapes.refined[one.shape].items()}
     return source | {"mesh_size": one.mesh_size, "refined": refined}
 
 
-def mesh_key(part, one):
+def mesh_key(shapes, one):
     """Key of a scene's mesh."""
     return hash_of(
-        parameters(mesh_source(part, one)), stage_key("studies.kinds.bodies.mesh"), _reader(part.shape[one.shape])
+        parameters(mesh_source(shapes, one)), stage_key("studies.kinds.bodies.mesh"), _reader(shapes.shape[one.shape])
     )
 
 
@@ -58,56 +58,57 @@ def _reader(shape):
     return mesh_type_key(OWN_FILE) if shape.file else ""
 
 
-def _case(part, shape, material, name):
+def _case(shapes, shape, material, name):
     """Thickness, load and materials of a scene; densities only under gravity."""
     from .task_values import load
 
-    case = part.shape[shape].loads[name]
+    case = shapes.shape[shape].loads[name]
     weighs = any(case.gravity)
-    materials = {key: material_key(one, weighs) for key, one in part.materials_of(shape, material).items()}
-    return {"thickness": part.shape[shape].thickness, "load": load(case), "materials": materials}
+    materials = {key: material_key(one, weighs) for key, one in shapes.materials_of(shape, material).items()}
+    return {"thickness": shapes.shape[shape].thickness, "load": load(case), "materials": materials}
 
 
-def reference_task(part, shape, material, name, law=""):
+def reference_task(shapes, shape, material, name, law=""):
     """Task of a reference of small strain, or of a law at finite strain."""
-    task = {"shape": source_of(part.shape[shape])} | _case(part, shape, material, name) | ({"law": law} if law else {})
+    task = {"shape": source_of(shapes.shape[shape])} | _case(shapes, shape, material, name)
+    task |= {"law": law} if law else {}
     without = () if law else ("reference.finite_shapes", "reference.finite_strain")
     code = (
         stage_key("studies.kinds.bodies.shape_reference", attempts.MODULE, without=without),
-        _reader(part.shape[shape]),
+        _reader(shapes.shape[shape]),
     )
     key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 
 
-def scene_task(part, one, kept=()):
+def scene_task(shapes, one, kept=()):
     """Task of a scene."""
-    task = _case(part, one.shape, one.material, one.load)
+    task = _case(shapes, one.shape, one.material, one.load)
     task |= {"definition": one.definition, "kinematics": one.kinematics}
     # References of shapes have tasks of their own.
     without = "reference.finite_shapes", "reference.finite_strain"
     code = stage_key("studies.kinds.bodies.solve", without=without), definition_key(one.definition)
-    key = hash_of(mesh_key(part, one), task, code)
+    key = hash_of(mesh_key(shapes, one), task, code)
     return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
 
 
-def shown(part):
+def shown(shapes):
     """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
     cases, size = defaultdict(list), attrgetter("mesh_size")
-    for one in part.scenes:
+    for one in shapes.scenes:
         cases[one.shape, one.load].append(one)
     found = set()
     for scenes in cases.values():
-        few = [one for one in scenes if particles(part, one) <= MOST_DRAWN]
+        few = [one for one in scenes if particles(shapes, one) <= MOST_DRAWN]
         mesh = min(few, key=size) if few else max(scenes, key=size)
         alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
         found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
     return found
 
 
-def by_mesh(part):
+def by_mesh(shapes):
     """Scenes by the name of their mesh."""
     found = defaultdict(list)
-    for one in part.scenes:
+    for one in shapes.scenes:
         found[mesh_name(one)].append(one)
     return found

@@ -11,22 +11,22 @@ from .shape_plan import file_name
 
 def _mesh_tasks(study):
     """Tasks of meshes, each with the expected seconds of all that is solved on it."""
-    curves, part = beam_plan.curves_by_mesh(study), study.shapes
+    curves, shapes = beam_plan.curves_by_mesh(study), study.shapes
     for mesh, scenes in beam_plan.scenes_by_mesh(study).items():
         count, name = beam_plan.particles(mesh), stem(mesh)
         seconds = (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
         seconds += sum(expected_seconds(count, scene.definition) for scene in scenes)
         yield Task(beam_plan.mesh_source(mesh), seconds=seconds, name=name, file=name, key=beam_plan.mesh_key(mesh))
-    for one, *others in shape_plan.by_mesh(part).values() if part else ():
-        count, name = shape_plan.particles(part, one), file_name(one)
+    for one, *others in shape_plan.by_mesh(shapes).values() if shapes else ():
+        count, name = shape_plan.particles(shapes, one), file_name(one)
         seconds = sum(expected_seconds(count, scene.definition) for scene in (one, *others))
-        source = shape_plan.mesh_source(part, one)
-        yield Task(source, seconds=seconds, name=name, file=name, key=shape_plan.mesh_key(part, one))
+        source = shape_plan.mesh_source(shapes, one)
+        yield Task(source, seconds=seconds, name=name, file=name, key=shape_plan.mesh_key(shapes, one))
 
 
 def _reference_tasks(study):
     """Tasks of references, of which those that share elements are in one job, and of interpolants."""
-    found, part = {}, study.shapes
+    found, shapes = {}, study.shapes
     for one in study.references:
         body = one.beam, one.material, one.load
         if "interpolant" not in beam_plan.reference_of(study, *body):
@@ -42,8 +42,8 @@ def _reference_tasks(study):
         keys = {beam_plan.solved_reference(*body)["key"]: problem for body, problem in problems.items()}
         values = {"kind": kind, "box": box, "problems": keys}
         yield Task(values, seconds=3e-2 * beam_plan.expected_solves(box), name=key, key=key)
-    for one in (*part.referred, *part.finite) if part else ():
-        task = shape_plan.reference_task(part, *one)
+    for one in (*shapes.referred, *shapes.finite) if shapes else ():
+        task = shape_plan.reference_task(shapes, *one)
         yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
 
 
@@ -62,11 +62,11 @@ def _solve_tasks(study):
         shared, name = {"beam": (mesh.beam.length, mesh.beam.height, mesh.beam.thickness)}, stem(mesh)
         for task in tasks:
             yield Task(task, name=name, file=name, shared=shared, key=task["key"])
-    if part := study.shapes:
-        kept = shape_plan.shown(part) if DRAWING in study.outputs else ()
-        for scenes in shape_plan.by_mesh(part).values():
-            shared = {"shape": beam_plan.parameters(shape_plan.source_of(part.shape[scenes[0].shape]))}
-            for task in (shape_plan.scene_task(part, one, kept) for one in scenes):
+    if shapes := study.shapes:
+        kept = shape_plan.shown(shapes) if DRAWING in study.outputs else ()
+        for scenes in shape_plan.by_mesh(shapes).values():
+            shared = {"shape": beam_plan.parameters(shape_plan.source_of(shapes.shape[scenes[0].shape]))}
+            for task in (shape_plan.scene_task(shapes, one, kept) for one in scenes):
                 name = file_name(scenes[0])
                 yield Task(task, name=name, file=name, shared=shared, key=task["key"])
 
