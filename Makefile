@@ -88,7 +88,7 @@ slow: $(VENV)/.test $(ENGINES)/.done
 lint: $(VENV)/.test
 	sh tools/lint.sh
 
-# What is written from the code: schema and manual of studies, and docs/catalogue.md of all definitions; half a minute.
+# What is written from the code: schema and manual of studies, and the catalogue of definitions; a minute.
 docs: $(VENV)/.run
 	SPRINGTUNE_PLUGINS=none python tools/manual.py
 	SPRINGTUNE_PLUGINS=none OPENBLAS_NUM_THREADS=1 python tools/catalogue.py
