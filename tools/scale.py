@@ -97,7 +97,7 @@ def plan_and_note(config: str) -> None:
     jobs = rerun.jobs(loaded, Path("results") / loaded.name)
     for job in jobs.values():
         job.write()
-    found = {"scenes": len(loaded.scenes), "jobs": len(jobs), "digest": jobs[rerun.COLLECT].digest}
+    found = {"scenes": len(loaded.scenes), "digest": jobs[rerun.COLLECT].digest}
     found["stages"] = {name: [job.stage.name, job.digest] for name, job in jobs.items() if job.stage}
     Path("plan.json").write_text(json.dumps(found))
 
@@ -168,28 +168,24 @@ def measure(scenes: int, folder: Path) -> dict[str, Numbers]:
     found = {"plan": python(tool, "plan", config)}
     noted = json.loads((folder / "plan.json").read_text())
     assert noted["scenes"] == scenes, f"the study has {noted['scenes']} scenes"
-    found["plan"]["jobs"] = noted["jobs"]
     snakefile = str(ROOT / "Snakefile")
     found["reading"] = python("-m", "snakemake", "-n", "-q", "all", "-s", snakefile, "--configfile", config)
     python(tool, "stages", config, "solve" if scenes <= SOLVED else "invent")
     if scenes <= SOLVED:
         found["solve"] = {"s": json.loads((folder / "solve.json").read_text())}
     stored = [path for path in results.rglob("*") if path.is_file()]
-    found["store"] = {"files": len(stored), "MB": megabytes(*stored)}
+    found["store"] = {"MB": megabytes(*stored)}
     dataset, done = results / "dataset.nc", str(results / "done/collect.json")
     words = (config, f"results/{results.name}", str(dataset), done, noted["digest"])
     found["collect"] = python("-m", "springtune.studies.kinds.collect", *words)
     found["dataset"] = {"MB": megabytes(dataset)}
     page, done = results / "index.html", str(results / "done/browse.json")
     found["page"] = python("-m", "springtune.studies.output.browse.page", str(dataset), str(page), done, "")
-    found["page"]["file"] = megabytes(page)
     done = str(results / "done/present.json")
     found["tables"] = python("-m", "springtune.studies.output.present", str(dataset), str(results), done, "", "tables")
-    found["tables"]["file"] = megabytes(*(results / "tables").iterdir())
     done = str(results / "done/figures.json")
     words = (str(dataset), str(results), done, "", "size", "sweep")
     found["figures"] = python("-m", "springtune.studies.output.present", *words)
-    found["figures"]["file"] = megabytes(*(results / "figures").iterdir())
     return found
 
 
@@ -198,52 +194,38 @@ def measure(scenes: int, folder: Path) -> dict[str, Numbers]:
 ROWS = (
     ("reading: `snakemake -n`", "reading", "s", "s"),
     ("", "reading", "MB", "MB"),
-    ("jobs of a run", "plan", "jobs", ""),
     ("solving, meshes of 100 to 1,000 particles", "solve", "s", "s"),
-    ("store: files", "store", "files", ""),
     ("store: size", "store", "MB", "MB"),
     ("collect", "collect", "s", "s"),
     ("", "collect", "MB", "MB"),
     ("`dataset.nc`", "dataset", "MB", "MB"),
     ("page to browse", "page", "s", "s"),
-    ("", "page", "MB", "MB"),
-    ("its size", "page", "file", "MB"),
     ("tables", "tables", "s", "s"),
-    ("", "tables", "MB", "MB"),
-    ("their size", "tables", "file", "MB"),
     ("figures of sizes and sweeps", "figures", "s", "s"),
-    ("", "figures", "MB", "MB"),
-    ("their size", "figures", "file", "MB"),
 )
-"""What is told, the step and number that it is, and its unit; memory stands below the seconds of the same step."""
+"""Label of a row, step and number that it shows, and unit; memory is below the seconds of the same step."""
 
 
-LARGEST_PAGE = "at most 5 MB"
-"""Size of a page to browse, see `springtune.studies.output.browse.page`."""
+def extrapolated(known: dict[int, float]) -> Callable[[int], float]:
+    """Return the number at a further size, by the exponent between the last two sizes.
 
-
-def extrapolated(known: dict[int, float]) -> tuple[float, Callable[[int], float]]:
-    """Exponent of what grows with the number of scenes, by the last two sizes, and the number at a further size.
-
-    With the smallest size and the last two ``q(n) = a + b n^p``, where a is what is taken in any case. What grew by
-    less than an exponent of 1 is extrapolated by 1: what scenes shared so far they need not share further on.
+    With the smallest size and the last two ``q(n) = a + b n^p``, where a is a constant cost. An exponent below 1 is
+    extrapolated by 1: scenes of larger studies may share less.
     """
     (first, least), *_, (before, less), (last, most) = sorted(known.items())
     always, power = least, 0.0
     if not most > less > least:
-        return power, lambda scenes: most + max(most - least, 0.0) * (scenes / last - 1)
+        return lambda scenes: most + max(most - least, 0.0) * (scenes / last - 1)
     for _ in range(50):  # each a is nearer to the one that the smallest size belongs to
         power = math.log((most - always) / (less - always)) / math.log(last / before)
         always = least - (most - always) * (first / last) ** power
     if power < 1:
-        return power, lambda scenes: least + (most - least) * scenes / last
-    return power, lambda scenes: always + (most - always) * (scenes / last) ** power
+        return lambda scenes: least + (most - least) * scenes / last
+    return lambda scenes: always + (most - always) * (scenes / last) ** power
 
 
 def number(value: float, unit: str) -> str:
-    """A number in two digits, counts in whole."""
-    if not unit:
-        return f"{round(value):,}" if value < 1e4 else f"{float(f'{value:.2g}'):,.0f}"
+    """Return a number in two digits with its unit."""
     if unit == "s" and value >= 600:
         return f"{float(f'{value / 60:.2g}'):,g} min" if value < 7200 else f"{float(f'{value / 3600:.2g}'):,g} h"
     if unit == "MB" and value >= 1e3:
@@ -254,16 +236,14 @@ def number(value: float, unit: str) -> str:
 def table(found: dict[int, dict[str, Numbers]]) -> str:
     """What was measured, and what that makes of larger studies, as a table of a page."""
     shown = [size for size in sorted(found) if size > min(SIZES)]
-    heads = [*(f"{size:,}" for size in shown), "exponent", *(f"{size:,}" for size in FURTHER)]
+    heads = [f"{size:,}" for size in (*shown, *FURTHER)]
     lines = [f"| scenes | {' | '.join(heads)} |", f"| --- |{' ---: |' * len(heads)}"]
-    for told, step, name, unit in ROWS:
+    for label, step, name, unit in ROWS:
         known = {size: steps[step][name] for size, steps in found.items() if step in steps}
-        power, further = extrapolated(known)
+        further = extrapolated(known)
         cells = [number(known[size], unit) if size in known else f"*{number(further(size), unit)}*" for size in shown]
-        bounded = (step, name) == ("page", "file")
-        cells += ["" if bounded else f"{power:.2f}"]
-        cells += [LARGEST_PAGE if bounded else f"*{number(further(size), unit)}*" for size in FURTHER]
-        lines.append(f"| {told} | {' | '.join(cells)} |")
+        cells += [f"*{number(further(size), unit)}*" for size in FURTHER]
+        lines.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 
