@@ -167,7 +167,7 @@ class TestEnding:
         folder = planned[1]["collect"].folder
         (folder / "figures").mkdir(parents=True)
         (folder / "dataset.nc").touch()
-        (folder / summary.FILE).write_text("Told before\n")
+        (folder / rerun.SUMMARY).write_text("Told before\n")
         text, *_ = self.finish(planned, "solve")
         assert "Told before" in text and "new      solve 4 of 4; the others were stored before" in text
         assert f"results  {folder}: dataset.nc, figures/" in text
@@ -176,8 +176,8 @@ class TestEnding:
     def test_a_summary_older_than_the_results_is_not_shown(self, planned):
         folder = planned[1]["collect"].folder
         folder.mkdir(parents=True)
-        (folder / summary.FILE).write_text("Told before\n")
-        os.utime(folder / summary.FILE, (0, 0))
+        (folder / rerun.SUMMARY).write_text("Told before\n")
+        os.utime(folder / rerun.SUMMARY, (0, 0))
         text, *_ = self.finish(planned, "solve")
         assert "Told before" not in text and "The dataset is older than these results." in text
 
@@ -196,9 +196,9 @@ class TestEnding:
 
     def test_a_run_with_nothing_to_do_reminds_of_holes(self, tmp_path):
         assert summary.reminder(tmp_path) == ""
-        (tmp_path / summary.FILE).write_text("A study\n\nNot everything is solved: 1 of 2 scenes.\n")
+        (tmp_path / rerun.SUMMARY).write_text("A study\n\nNot everything is solved: 1 of 2 scenes.\n")
         lines = summary.reminder(tmp_path).splitlines()
-        assert lines[0] == "Not everything is solved: 1 of 2 scenes." and f"{summary.FILE} has the reasons" in lines[1]
+        assert lines[0] == "Not everything is solved: 1 of 2 scenes." and f"{rerun.SUMMARY} has the reasons" in lines[1]
 
 
 class Terminal(io.StringIO):

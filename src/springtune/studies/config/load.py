@@ -15,14 +15,13 @@ from .model import Study
 from .sections import study_model
 
 
-def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) -> Study:
+def load(path: str | Path, kinds: tuple[Kind, ...]) -> Study:
     """Read, validate and expand a study."""
     path, file = Path(path), str(path)
-    beside = beside or path.parent
     text, content, lines = read_study(path)
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
-    problems = Problems(file, lines, content, beside)
+    problems = Problems(file, lines, content, path.parent)
     model = study_model(kinds)
     if content is None:
         problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
@@ -46,7 +45,7 @@ def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) 
     problems.stop()
     check_definitions(config, grids, problems)
     problems.stop()
-    printed_path = beside / config.printed if config.printed else None
+    printed_path = path.parent / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    about["files"] = tuple(beside / name for name in files)
+    about["files"] = tuple(path.parent / name for name in files)
     return build(config, bodies, grids, kinds, problems, about)

@@ -89,9 +89,9 @@ class Problems:
         """Return whether no problem was added."""
         return not self._found
 
-    def stop_at(self, path: Iterable[Key], message: str, line: int = 0) -> None:
+    def stop_at(self, path: Iterable[Key], message: str) -> None:
         """Add a problem, and raise."""
-        self.add(path, message, line)
+        self.add(path, message)
         self.stop()
 
     def stop(self) -> None:

@@ -9,15 +9,13 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 
-def load_study(path: str | Path, beside: Path | None = None) -> "Study":
+def load_study(path: str | Path) -> "Study":
     """Read, validate and expand a study.
 
     Parameters
     ----------
     path : str or Path
-        YAML file.
-    beside : Path, optional
-        Folder that the names of its files are seen from; its own without.
+        YAML file; files that it names are seen from its folder.
 
     Returns
     -------
@@ -40,4 +38,4 @@ def load_study(path: str | Path, beside: Path | None = None) -> "Study":
     """
     from ..config.load import load  # here, since pydantic takes a fifth of a second to import
 
-    return load(path, kinds(), beside)
+    return load(path, kinds())

@@ -11,7 +11,7 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
-from ..output import dataset, summing_up, text
+from ..output import dataset, summing_up
 from ..runs import job, provenance, rerun
 from ..runs.plan import rows
 from ..runs.store import DamagedError
@@ -32,7 +32,7 @@ def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
         raise SystemExit(str(error)) from None
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
-    told = output.with_name(text.FILE)
+    told = output.with_name(rerun.SUMMARY)
     atomic.write_text(told, summing_up.text(groups, study.title))
 
 

@@ -202,17 +202,17 @@ def of_own_law(finite: xr.Dataset) -> xr.Dataset | None:
     return found
 
 
-def judged(data: xr.Dataset, finite: xr.Dataset | None = None, name: str = "deformation_error") -> xr.DataArray:
-    """Errors of solved cells whose reference applies, NaN elsewhere.
+def judged(data: xr.Dataset, finite: xr.Dataset | None = None) -> xr.DataArray:
+    """Deformation errors of solved cells whose reference applies, NaN elsewhere.
 
     Those of nonlinear networks are against references at `finite` strain where there are any.
     """
     solved = data.status == Status.SOLVED
-    errors = data[name].where(solved & (data.get("reference_applies", 1) == 1))
+    errors = data.deformation_error.where(solved & (data.get("reference_applies", 1) == 1))
     at_finite_strain = None if finite is None else of_own_law(finite)
     if at_finite_strain is not None:
-        errors = errors.where(data.kinematics == "linear", at_finite_strain[name].where(solved))
-    return errors.transpose(*data[name].dims)
+        errors = errors.where(data.kinematics == "linear", at_finite_strain.deformation_error.where(solved))
+    return errors.transpose(*data.deformation_error.dims)
 
 
 def own_law(cell: xr.Dataset, name: str) -> str | None:

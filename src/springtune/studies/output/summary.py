@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from springtune.safe_io.tables import aligned, clock
 
 from ..runs.plan import Job
+from ..runs.rerun import DATASET, PAGE, PAPER_FILE, SUMMARY
 from ..runs.source import RECORDS, read_note
-from .text import FILE, HOLES
+from .text import HOLES
 
 if TYPE_CHECKING:
     from ..config.model import Study
@@ -67,10 +68,10 @@ def _folder(jobs: Jobs) -> Path:
 def reminder(folder: Path) -> str:
     """Report if nothing was to do."""
     try:
-        lines = (folder / FILE).read_text().splitlines()
+        lines = (folder / SUMMARY).read_text().splitlines()
     except OSError:
         return ""
-    last = [lines[-1], f"{folder / FILE} has the reasons."] if lines[-1].startswith(HOLES) else []
+    last = [lines[-1], f"{folder / SUMMARY} has the reasons."] if lines[-1].startswith(HOLES) else []
     return "\n".join([*last, _places(folder)]) + "\n"
 
 
@@ -81,7 +82,7 @@ def _time(path: Path) -> float:
 
 def _stored(study: "Study", jobs: Jobs) -> str:
     """Stored summary, if it is up to date."""
-    path = _folder(jobs) / FILE
+    path = _folder(jobs) / SUMMARY
     if not path.exists():
         return f"{study.title}\n\nThere is no dataset yet.\n"
     if any(job.stage and _time(job.record) > _time(path) for job in jobs.values()):
@@ -105,7 +106,7 @@ def _computed(jobs: Jobs, since: float) -> str:
 
 def _places(folder: Path) -> str:
     """Existing results, most useful first."""
-    files = ("paper.pdf", "index.html", "dataset.nc", "tables/index.html")
+    files = (PAPER_FILE, PAGE, DATASET, "tables/index.html")
     names = [name for name in files if (folder / name).exists()]
     names += [f"{name}/" for name in ("figures", "tables", "paraview", "meshes") if (folder / name).is_dir()]
     if "tables/index.html" in names:

@@ -14,11 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-FILE = "summary.txt"
-"""Summary of a dataset beside it."""
-
 HOLES = "Not everything is solved"
-"""How its last line begins where scenes are not solved."""
+"""How the last line of a dataset's summary begins where scenes are not solved."""
 
 
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:

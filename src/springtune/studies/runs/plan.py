@@ -173,16 +173,13 @@ def _job(stage: Stage, folder: Path, label: str, tasks: Iterable[Task]) -> Job:
     return Job(folder, f"{stage.name}_{label}", digest, products, stage=stage, label=label, content=content)
 
 
-def results(
-    stage: Stage, study: "Study", folder: Path, fields: Iterable[str] = ()
-) -> Iterator[tuple[Task, dict[str, Any]]]:
-    """Tasks of a stage and their stored results, in the order of the tasks."""
+def results(stage: Stage, study: "Study", folder: Path) -> Iterator[tuple[Task, dict[str, Any]]]:
+    """Tasks of a stage and the scalars of their stored results, in the order of the tasks."""
     tasks, files = list(stage.tasks(study)), defaultdict(list)
     keys = [task.key_of(stage) for task in tasks]
     for task, key in zip(tasks, keys):
         files[task.file or key].append(key)
-    fields = list(fields)
-    found = {name: store.read(folder / stage.folder / f"{name}.h5", held, fields) for name, held in files.items()}
+    found = {name: store.read(folder / stage.folder / f"{name}.h5", held) for name, held in files.items()}
     for task, key in zip(tasks, keys):
         yield task, dict(found[task.file or key][key])
 
