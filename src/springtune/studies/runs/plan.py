@@ -39,8 +39,6 @@ class Task:
         Further parts of its key: code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`.
     labels : dict
         Labels of its cell of the dataset; a label may be several.
-    of : object
-        Object of the study that it comes from.
     seconds : float
         Expected seconds, for bundles of about equal work.
     name : str
@@ -56,7 +54,6 @@ class Task:
     values: Mapping[str, Any]
     also: Sequence[object] = ()
     labels: Mapping[str, Any] = field(default_factory=dict)
-    of: Any = None
     seconds: float = 0.0
     name: str = ""
     file: str = ""

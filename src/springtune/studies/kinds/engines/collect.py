@@ -73,7 +73,8 @@ ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, FACTOR)) | BEST, 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.bodies.collect.groups`."""
-    made, found = {}, [(task.of, task.labels | result) for task, result in results(STAGE, study, folder)]
+    runs = zip(study.parts["engines"], results(STAGE, study, folder), strict=True)
+    made, found = {}, [(run.of_curve, run.labels | result) for run, (_, result) in runs]
     for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
         rows = [row for of_curve, row in found if of_curve == wanted]
         axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}

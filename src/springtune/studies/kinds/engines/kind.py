@@ -188,7 +188,7 @@ def _tasks(study):
         values = {name: value for name, value in run.values.items() if name != "scene"}
         also = mesh_type_key(values["mesh_type"]), definition_key(values["definition"]), declared_key(engine)
         values["engine_version"] = _version(engine)
-        yield Task(values, also, run.labels, run.of_curve, name=engine.name)
+        yield Task(values, also, run.labels, name=engine.name)
 
 
 STAGE = Stage("engines", "studies.kinds.engines.solve", _tasks, alone=True)

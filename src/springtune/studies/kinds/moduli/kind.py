@@ -76,7 +76,7 @@ def _tasks(study):
         also = mesh_parameters(mesh), mesh_type_key(mesh_type), definition_key(definition)
         values = {"definition": definition, "poisson_ratio": ratio}
         seconds = expected_seconds(particles(mesh), definition)
-        yield Task(values, also, labels, None, seconds, name, name, {"mesh": mesh_source(mesh)})
+        yield Task(values, also, labels, seconds, name, file=name, shared={"mesh": mesh_source(mesh)})
 
 
 def _mesh_of(study, box, mesh_type, size):
