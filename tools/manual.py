@@ -1,6 +1,7 @@
 """Write the JSON schema of studies and the tables of their manual into config/: python tools/manual.py [FOLDER]."""
 
 import inspect
+import re
 import sys
 from pathlib import Path
 from typing import get_args, get_origin
@@ -32,16 +33,33 @@ def _key_tables():
         paragraphs = [" ".join(paragraph.split()) for paragraph in (inspect.getdoc(model) or "").split("\n\n")]
         heading = ", ".join(f"`{place}`" for place in where if place) or "The file"
         parts += ["", f"### {heading}", "", "\n\n".join(paragraphs), ""]
-        parts += ["| key | value | default | meaning |", "|---|---|---|---|"]
+        parts += ["| key | value | meaning |", "|---|---|---|"]
         parts += [_key_row(field.alias or name, field) for name, field in model.model_fields.items()]
     return "\n".join(parts) + "\n\n"
 
 
 def _key_row(key, field):
-    default = "required" if field.is_required() else f"`{field.default}`" if isinstance(field.default, str) else "none"
-    if field.default_factory is not None:
-        default = "its keys' defaults"
-    return f"| `{key}` | {words(field)} | {default} | {field.description} |"
+    name = f"**`{key}`**" if field.is_required() else f"`{key}`"
+    default = f"; `{field.default}`" if isinstance(field.default, str) else ""
+    return f"| {name} | {_value(words(field))}{default} | {field.description} |"
+
+
+def _value(text):
+    """What to give, without articles and examples; a plural accepts one value or a list."""
+    text = re.sub(r",? such as ('[^']*'|`[^`]*`|-?[\d.]+)", "", text)
+    text = re.sub(r"\ba section for each .*, by name", "sections by name", text)
+    text = re.sub(r"\b(?:the name of )an? (\w+)(?: of the \w+)?", r"\1 name", text)
+    text = re.sub(r"\ba whole number from (\d+) to (\d+)", r"\1 to \2", text)
+    text = re.sub(r"^(\w+) along x and y, such as (\[.*\])", r"\1 `\2`", text)
+    text = re.sub(r"\b(?:an?|the) (?=\w)", "", text.replace(" and at most ", ", at most "))
+    text = re.sub(r"path of (?:CSV )?file|list of (?=sections)", lambda found: "path" * ("path" in found[0]), text)
+    text = re.sub(r"^([a-z ]+?)(e?s)?(?:, or list|, list, or range)$", _plural, text)
+    return text.replace(", list, or range", ", list or range").replace("'", "`")
+
+
+def _plural(found):
+    several = found[1] + (f"{found[2]}es" if found[2] else "s")
+    return several + " or range" * found[0].endswith("range")
 
 
 def sections(model, place=""):

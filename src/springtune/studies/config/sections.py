@@ -24,35 +24,35 @@ class BeamConfig(Section):
     """A rectangular sheet, its length along x."""
 
     length: fields.Length
-    """Extent along x, the direction of the load."""
+    """Along x, the direction of the load."""
 
     height: fields.Length
-    """Extent along y."""
+    """Along y."""
 
     thickness: fields.Length = default("1 mm")
-    """Extent out of the plane."""
+    """Out of the plane."""
 
 
 class StiffnessConfig(Section):
-    """Stiffness of a sheet in plane stress, in the order xx, yy and xy with the shear angle; positive definite."""
+    """Stiffness of a sheet in plane stress; the matrix is positive definite."""
 
     C11: fields.Stress
-    """Stress along x for a strain along x."""
+    """From strain along x to stress along x."""
 
     C22: fields.Stress
-    """Stress along y for a strain along y."""
+    """From strain along y to stress along y."""
 
     C12: fields.SignedStress
-    """Stress along x for a strain along y."""
+    """From strain along y to stress along x."""
 
     C66: fields.Stress
-    """Shear stress for a shear angle."""
+    """From shear angle to shear stress."""
 
     C16: fields.SignedStress = default("0 Pa")
-    """Shear stress for a strain along x."""
+    """From strain along x to shear stress."""
 
     C26: fields.SignedStress = default("0 Pa")
-    """Shear stress for a strain along y."""
+    """From strain along y to shear stress."""
 
 
 MATERIAL_FORMS = (
@@ -74,10 +74,9 @@ def _one_form(schema: dict[str, Any]) -> None:
 class MaterialConfig(Section):
     """A material, in one of four forms.
 
-    Isotropic: `young_modulus` and `poisson_ratio`. Orthotropic, such as a ply of fibres: `young_modulus_x`,
-    `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, which `angle` turns; several angles
-    make a laminate. Any anisotropy: `stiffness`. Rubber: `uniaxial_test`, to which Yeoh's law is fitted; in small
-    strain it has the initial modulus of that law and nu = 0.5. Beams need an isotropic material or rubber.
+    Isotropic: `young_modulus` and `poisson_ratio`. Orthotropic: `young_modulus_x`, `young_modulus_y`,
+    `poisson_ratio_xy` and `shear_modulus`. Any anisotropy: `stiffness`. Rubber: `uniaxial_test`, to which Yeoh's law
+    is fitted; in small strain it has its initial modulus and nu = 0.5. Beams need an isotropic material or rubber.
     """
 
     model_config = ConfigDict(json_schema_extra=_one_form)
@@ -89,8 +88,8 @@ class MaterialConfig(Section):
     """Poisson's ratio nu; 0.5 is allowed in plane stress."""
 
     plane: fields.Plane | None = None
-    """'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those of the
-    material in three dimensions in both. Isotropic materials alone."""
+    """Plane stress (a thin sheet, the default) or plane strain (a slice of a long body), of an isotropic material. E
+    and nu are three-dimensional in both."""
 
     young_modulus_x: fields.Stress | None = None
     """Young's modulus along the fibres."""
@@ -99,34 +98,33 @@ class MaterialConfig(Section):
     """Young's modulus across the fibres."""
 
     poisson_ratio_xy: fields.OrthotropicRatio | None = None
-    """Contraction across the fibres over extension along them, when pulled along them."""
+    """Contraction across the fibres over extension along them."""
 
     shear_modulus: fields.Stress | None = None
     """Shear modulus along and across the fibres."""
 
     angle: fields.Angles | None = None
-    """Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the plies of a
-    laminate of equal thicknesses and symmetric stacking."""
+    """Angle from the x axis to the fibres, counter-clockwise; 0 by default. Several angles make a symmetric laminate of
+    equal plies."""
 
     stiffness: StiffnessConfig | None = None
     """Elastic constants in plane stress."""
 
     uniaxial_test: fields.FileName | None = None
-    """CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and nominal stress
-    under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. Definition `yeoh` uses
-    the fitted law."""
+    """CSV file of a uniaxial test of rubber, with a head such as `stretch,nominal stress [MPa]` or
+    `strain [%],nominal stress [MPa]`. The definition `yeoh` uses the fitted law."""
 
     terms: fields.Terms | None = None
-    """Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."""
+    """Terms of the fitted law; 3 by default; 1 is the neo-Hookean law."""
 
     equibiaxial_test: fields.FileName | None = None
-    """CSV file of an equibiaxial test, to compare the fitted law with."""
+    """CSV file of an equibiaxial test, to check the law."""
 
     pure_shear_test: fields.FileName | None = None
-    """CSV file of a pure-shear test, to compare the fitted law with."""
+    """CSV file of a pure-shear test, to check the law."""
 
     density: fields.Density | None = None
-    """Density rho; needed for dynamics and gravity, not for statics."""
+    """Density, needed for dynamics and gravity."""
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -182,7 +180,7 @@ class MaterialConfig(Section):
 
 
 class StatedStiffness(Section):
-    """A stated stiffness of one mesh type and material."""
+    """The stiffness for one mesh type and material."""
 
     mesh_type: fields.MeshType
     """Mesh type."""
@@ -191,45 +189,41 @@ class StatedStiffness(Section):
     """Material."""
 
     value: fields.Stiffness = Field(
-        description=f"Stiffness of every spring; refused beyond a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
+        description=f"Stiffness of every spring, within a factor of {PLAUSIBLE:g} of sqrt(3)/2 E t."
     )
 
 
 class PaperConfig(Section):
-    """Parameters of the definition `paper`: stated stiffnesses."""
+    """The definition `paper`: stiffnesses from print."""
 
     stiffness: list[StatedStiffness] = Field(
         min_length=1, title="a list such as [{mesh_type: structured, material: steel, value: 170e6 N/m}]"
     )
-    """One entry for each mesh type and material of the grids with `paper`."""
+    """One entry per mesh type and material."""
 
 
 class CalibratedConfig(Section):
-    """Parameters of the definition `calibrated`.
-
-    For each mesh type, material and kinematics, the stiffness is the mean of the best stiffnesses of the study's
-    sensitivity curves of one beam and load, over all mesh sizes.
-    """
+    """The definition `calibrated`: the mean of the best stiffnesses of one beam and load over all mesh sizes."""
 
     beam: fields.BeamName
-    """Beam whose curves calibrate."""
+    """Beam to calibrate on."""
 
     load: fields.Load
-    """Load whose curves calibrate."""
+    """Load to calibrate on."""
 
 
 class DefinitionsConfig(Section):
-    """Parameters of the two definitions that need some; `springtune definitions` lists all definitions."""
+    """Parameters of two definitions. `springtune definitions` lists all."""
 
     paper: PaperConfig | None = None
-    """Stated stiffnesses; needed if a grid uses `paper`."""
+    """Needed if a grid uses `paper`."""
 
     calibrated: CalibratedConfig | None = None
-    """Beam and load to calibrate on; needed if a grid uses `calibrated`."""
+    """Needed if a grid uses `calibrated`."""
 
 
 class SensitivityConfig(Section):
-    """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
+    """The stiffnesses of sensitivity curves, equally spaced, as multiples of sqrt(3)/2 E t."""
 
     start: fields.Ratio = default("0.4", alias="from")
     """Smallest stiffness."""
@@ -238,7 +232,7 @@ class SensitivityConfig(Section):
     """Largest stiffness."""
 
     points: fields.Points = default("61")
-    """Number of stiffnesses, both ends included."""
+    """Number of stiffnesses, with both ends."""
 
     @model_validator(mode="after")
     def _ascending(self) -> Self:
@@ -248,16 +242,16 @@ class SensitivityConfig(Section):
 
 
 class MeshFileConfig(Section):
-    """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
+    """A mesh file that fills a beam; its lower left corner may be anywhere."""
 
     file: fields.FileName
-    """The file, relative to the study's folder."""
+    """The mesh file."""
 
     beam: fields.BeamName
     """Beam that the mesh fills."""
 
     mesh_size: fields.Length
-    """Length of an edge, which names the mesh in grids and in the dataset."""
+    """Its name in grids and in the dataset."""
 
     unit: fields.Length = default("1 m")
     """Unit of the coordinates in the file."""
@@ -269,54 +263,49 @@ def _rows_may_give(schema: dict[str, Any]) -> None:
 
 
 class GridConfig(Section):
-    """A product of parameters: every combination of the listed values is a scene.
+    """Every combination of the values is a scene.
 
-    A single value is a list of one. A scene of two grids is solved once. Numbers may be a range with both ends
-    included: `{from: 1 mm, to: 5 mm, points: 9}`; with `spacing: logarithmic` the values grow by a constant factor.
-
-    The dimensions of the dataset are `beam`, `mesh_type`, `mesh_size`, `material`, `load`, `definition` and
-    `kinematics`. A grid that gives `thickness`, `young_modulus`, `poisson_ratio`, `stiffness_scale` or several forces
-    adds these as dimensions.
+    `thickness`, `young_modulus`, `poisson_ratio`, `stiffness_scale` and several forces add dimensions to the dataset.
     """
 
     model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
     beam: OneOrMore[fields.BeamName]
-    """Beams, by name."""
+    """Beams."""
 
     mesh_type: OneOrMore[fields.MeshType] = Field(
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
     mesh_size: fields.Lengths
-    """Lengths of an edge, at most the smaller side of each beam."""
+    """Lengths of edges, at most the smaller side of each beam."""
 
     material: OneOrMore[fields.MaterialName]
-    """Materials, by name."""
+    """Materials."""
 
     load: OneOrMore[fields.Load]
-    """With the left end clamped, `traction` and `compression` act along x on the right end, `bending` along y. With
-    the lower side clamped, `shear` acts along x on the upper side, which stays level, and `pressure` and
-    `follower-pressure` act down on it. All are spread evenly."""
+    """Left end clamped: `traction` and `compression` act along x on the right end, `bending` along y. Lower side
+    clamped: `shear` acts along x on the upper side, which stays level; `pressure` and `follower-pressure` press it
+    down."""
 
     force: fields.BeamForces | None = None
-    """Magnitude of the force, for all beams or for each; the load gives its sign. Several values make the force a
-    dimension. Otherwise a beam, material and load have the same force in all grids."""
+    """Size of the force. The load gives the sign. A single force must be the same in all grids with that beam, material
+    and load."""
 
     pressure: fields.Stresses | None = None
-    """Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`."""
+    """Instead of `force`, for both pressure loads."""
 
     thickness: fields.Lengths | None = None
-    """Thicknesses instead of the beams' own."""
+    """Replaces the beams' own."""
 
     young_modulus: fields.Stresses | None = None
-    """Young's moduli instead of the materials' own."""
+    """Replaces the materials' own."""
 
     poisson_ratio: fields.PoissonRatios | None = None
-    """Poisson's ratios instead of the materials' own."""
+    """Replaces the materials' own."""
 
     stiffness_scale: fields.Ratios | None = None
-    """Factors on all stiffnesses of a definition, including its energies."""
+    """Factors on all stiffnesses and energies of a definition."""
 
     @model_validator(mode="after")
     def _one_force(self) -> Self:
@@ -332,19 +321,17 @@ class GridConfig(Section):
         return self
 
     definition: OneOrMore[fields.DefinitionName]
-    """Rules for the stiffness of every spring; `springtune definitions` lists them."""
+    """`springtune definitions` lists them."""
 
     kinematics: OneOrMore[fields.Kinematics] = default("nonlinear")
-    """`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest."""
+    """`linear` springs keep their tangent at rest."""
 
     rows: Annotated[list[str], WithJsonSchema({"type": "string"}), Field(title="the path of a CSV file")] = []
-    """CSV file of combinations, relative to the study's folder: one column for each parameter, named as its key,
-    and one row for each combination, such as a mesh size with its own force. Units stand beside the numbers (`5 mm`)
-    or in the head (`mesh_size [mm]`). Other parameters of the grid are combined with each row."""
+    """CSV file with a combination in each row and a column per key, such as `mesh_size [mm]`. The grid's other keys are
+    combined with each row."""
 
     sensitivity: fields.Flag = default("true")
-    """Whether each mesh, material, load and kinematics gets a sensitivity curve. Curves that `calibrated` needs are
-    always computed."""
+    """Compute sensitivity curves. `calibrated` always gets its own."""
 
 
 GRID_PARAMETERS = tuple(name for name in GridConfig.model_fields if name not in ("rows", "sensitivity"))
@@ -359,19 +346,19 @@ def _own_names(files: dict[str, Any]) -> dict[str, Any]:
 
 
 class StudyConfig(Section):
-    """A study."""
+    """The keys of a study."""
 
     title: fields.Text
-    """Title of the study, one line."""
+    """Title, one line."""
 
     beams: Named[BeamConfig] = Field({}, title="a section for each beam, by name")
-    """Beams that grids and sections name."""
+    """Beams."""
 
     materials: Named[MaterialConfig] = Field({}, title="a section for each material, by name")
-    """Materials that grids and sections name."""
+    """Materials."""
 
     definitions: DefinitionsConfig = Field(default_factory=DefinitionsConfig)
-    """Parameters of the definitions `paper` and `calibrated`."""
+    """Parameters of `paper` and `calibrated`."""
 
     sensitivity: SensitivityConfig = Field(default_factory=SensitivityConfig)
     """Range of stiffness of the sensitivity curves."""
@@ -379,17 +366,16 @@ class StudyConfig(Section):
     mesh_files: Annotated[Named[list[MeshFileConfig]], AfterValidator(_own_names)] | None = Field(
         None, title="a list of files for each mesh type, by name"
     )
-    """Your own mesh types: for each a list of files, one for each beam and mesh size."""
+    """Your own mesh types: one file per beam and mesh size."""
 
     outputs: list[str] = Field([])
     further_references: OneOrMore[fields.FurtherReference] = []
-    """References at finite strain for every beam, material and load, besides the one of small strain. The group
-    `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each takes seconds.
-    Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with a `uniaxial_test`
-    and uses its fitted law."""
+    """References at finite strain, in addition to small strain: group `/finite_strain`, and `/block` under pressure.
+    Each takes seconds. In plane strain the material must be compressible. `yeoh-plane-stress` needs a
+    `uniaxial_test`."""
 
     printed: fields.FileName | None = None
-    """CSV file of printed values to compare with, relative to the study's folder."""
+    """CSV file of printed values to compare with."""
 
     grids: dict[str, GridConfig] = Field({})
 
@@ -430,8 +416,8 @@ def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
         OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]],
         Field(
             [output.name for output in made if output.usual],
-            description=f"Figures and tables of the dataset: {meanings}. "
-            "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
+            description=f"Figures and tables: {meanings}. "
+            "Figures of scenes show nonlinear kinematics if a grid has them.",
         ),
     )
     listed = ", ".join(f"`{name}`" for name in alone)
@@ -441,7 +427,7 @@ def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
             {},
             min_length=1,
             title="a section for each grid, by name",
-            description=f"Grids of scenes to compute. A study with one of {listed} needs none.",
+            description=f"Grids of scenes. Optional with one of {listed}.",
         ),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)

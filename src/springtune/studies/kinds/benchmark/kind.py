@@ -45,32 +45,32 @@ class BenchmarkSceneConfig(Section):
 
 
 class BenchmarkConfig(Section):
-    """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
+    """Run time against error of definitions and other approaches, measured one at a time."""
 
     scenes: Named[BenchmarkSceneConfig] = Field(title="a section for each scene, by name")
     """Scenes."""
 
     definition: fields.DefinitionNames
-    """Definitions that derive a stiffness and need no reference."""
+    """Definitions that derive a stiffness without a reference."""
 
     mesh_type: OneOrMore[fields.MadeType]
-    """Mesh types of the definitions."""
+    """Mesh types."""
 
     approach: OneOrMore[OtherApproach] = Field(list(OTHER_APPROACHES))
-    """Other approaches: finite elements, CalculiX where it is on the machine, and what the paper names:
-    tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without."""
+    """Finite elements, CalculiX if installed, tensor-mass, pre-computed responses, boundary elements, free-form
+    deformation. All by default."""
 
     mesh_size: OneOrMore[fields.Length]
-    """Lengths of an edge."""
+    """Lengths of edges."""
 
     finest: fields.Length | None = None
-    """Length of an edge below which approaches are not run; without, all sizes are."""
+    """Smallest mesh size of all approaches."""
 
     finest_of: dict[str, fields.Length] = Field(default_factory=dict)
-    """The same of single approaches by their names, such as `delingette/structured: 0.5 mm`."""
+    """Smallest mesh size of one approach, such as `delingette/structured: 0.5 mm`."""
 
     most_seconds: Seconds = default("30")
-    """Seconds after which an approach is not run on finer sizes, which are holes that say so."""
+    """An approach that took longer skips finer sizes."""
 
 
 def in_benchmark(load: str) -> bool:
@@ -171,7 +171,7 @@ VARIABLES = {
 
 KIND = Kind(
     "benchmark",
-    study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error; it makes the group `/benchmark`.")},
+    study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error: group `/benchmark`.")},
     check=_check,
     expand=_expand,
     axes=_axes,

@@ -14,7 +14,7 @@ def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
 OUTPUTS = (
     Output(
         "benchmark",
-        "figures and the page of the benchmark",
+        "run time against error, with a page",
         figures=lambda study: figures(study.axes.get("scene", ())),
         plot="studies.kinds.benchmark.figures:benchmark",
         texts={"speed.md": "studies.kinds.benchmark.figures:page"},

@@ -17,7 +17,7 @@ SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 """Dimensions of which a figure of sensitivity curves shows one label."""
 
 SCENE_LABELS = ("mesh_type", "material", "load")
-"""The same for figures of errors against mesh size, and of deformed networks."""
+"""The same for errors against mesh size, and of deformed networks."""
 
 SWEPT_SHOWN = {
     "force": ("Force [N]", "force_N", 1.0),
@@ -122,14 +122,14 @@ def _shape_cases(study: "Study") -> "list[dict[str, str]]":
 OUTPUTS = (
     Output(
         "sensitivity",
-        "figures of sensitivity curves",
+        "sensitivity curves",
         figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, _cells(study.curves)),
         plot=f"{PLOTS}:sensitivity",
         usual=True,
     ),
     Output(
         "size",
-        "figures of errors against mesh size",
+        "errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
         plot=f"{ERROR_PLOTS}:size",
         job="scenes",
@@ -137,7 +137,7 @@ OUTPUTS = (
     ),
     Output(
         "deformed",
-        "figures of deformed networks (and the group `/fields` behind them)",
+        "deformed networks, and the group `/fields`",
         figures=lambda study: distinct("deformed", SCENE_LABELS, _cells(study.scenes)),
         plot=f"{PLOTS}:deformed",
         job="scenes",
@@ -145,7 +145,7 @@ OUTPUTS = (
     ),
     Output(
         "sweep",
-        "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
+        "errors against a swept force, thickness, modulus, Poisson's ratio or stiffness",
         figures=_sweeps,
         plot=f"{ERROR_PLOTS}:sweep",
         job="scenes",
@@ -153,17 +153,16 @@ OUTPUTS = (
     ),
     Output(
         "paraview",
-        "deformed networks with displacements, their error, and stiffness and force of each spring, as files for "
-        "ParaView (and the group `/fields` behind them)",
+        "files for ParaView, with the force of each spring, and the group `/fields`",
         tables=lambda study: ["scenes.csv"],
         write="studies.output.scene_files:write",
         into="paraview",
         job="scenes",
     ),
-    Output("tables", "tables as the paper's, on one page", page=True, job="scenes", usual=True),
+    Output("tables", "the paper's tables, on one page", page=True, job="scenes", usual=True),
     Output(
         "block",
-        "the figure of a pressed face",
+        "a pressed face",
         figures=lambda study: {"block": {}},
         plot=f"{PLOTS}:block",
         job="scenes",
@@ -171,8 +170,7 @@ OUTPUTS = (
     ),
     Output(
         DRAWING,
-        "figures of shapes: errors of their quantities, and their deformed networks (and the group `/shape_fields` "
-        "behind them)",
+        "errors and deformed networks of shapes, and the group `/shape_fields`",
         figures=lambda study: shape_figures(_shape_cases(study)),
         plot="studies.kinds.bodies.shape_figures:shapes",
         usual=True,

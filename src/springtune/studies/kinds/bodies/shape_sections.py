@@ -62,17 +62,17 @@ def _or_text(*texts: str) -> Any:
 
 
 class SegmentConfig(Section):
-    """A side of an outline, from its corner to that of the next one."""
+    """A side, from its corner to the corner of the next side."""
 
     start: Place = Field(alias="from")
-    """Its corner."""
+    """First corner."""
 
     centre: Place | None = None
-    """Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse with its axes
-    along x and y where its ends are not equally far from it. It is straight without."""
+    """Centre of an arc of less than half a turn: of a circle, or of an ellipse with axes along x and y. Without it the
+    side is straight."""
 
     group: GroupName | None = None
-    """Group that it belongs to, for supports, loads and quantities."""
+    """Group, for supports, loads and quantities."""
 
 
 class CircleConfig(Section):
@@ -86,19 +86,19 @@ class CircleConfig(Section):
 
 
 class HoleConfig(Section):
-    """A hole, or what fills it: a circle, or an outline."""
+    """A hole, or a part of another material: a circle or an outline."""
 
     circle: CircleConfig | None = None
-    """Where it is round."""
+    """A round hole."""
 
     outline: list[SegmentConfig] | None = None
-    """Where it is not: a round of sides, in either sense."""
+    """Sides of another hole, in either sense."""
 
     group: GroupName | None = None
-    """Group that the circle belongs to; sides of an outline have their own."""
+    """Group of the circle."""
 
     part: PartName | None = None
-    """Part of the body that fills it, of a material under `parts`; nothing fills it without."""
+    """Part that fills the hole; its material is under `parts`."""
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -111,15 +111,15 @@ class HoleConfig(Section):
 
 
 class SupportConfig(Section):
-    """Displacements that a group, or a point, is given; `fixed` stands for none along both axes."""
+    """Prescribed displacements; `fixed` is zero along both axes."""
 
     model_config = {"json_schema_extra": _or_text("fixed")}
 
     x: Displacement | None = None
-    """Along x; free without."""
+    """Along x; free by default."""
 
     y: Displacement | None = None
-    """Along y; free without."""
+    """Along y; free by default."""
 
     @model_validator(mode="before")
     @classmethod
@@ -138,7 +138,7 @@ class SupportConfig(Section):
 
 
 class PressureConfig(Section):
-    """A pressure on a group, positive towards the body; a stress alone stands for one that keeps its direction."""
+    """A pressure on a group, positive towards the body. A stress alone keeps its direction."""
 
     model_config = {"json_schema_extra": _or_text()}
 
@@ -146,7 +146,7 @@ class PressureConfig(Section):
     """Pressure."""
 
     follower: fields.Flag = default("false")
-    """Whether it turns and grows with the sides, in nonlinear kinematics."""
+    """Whether it follows the sides in nonlinear kinematics."""
 
     @model_validator(mode="before")
     @classmethod
@@ -160,19 +160,19 @@ class QuantityConfig(Section):
     model_config = {"json_schema_extra": _or_text("area", "energy")}
 
     displacement: Axis | None = None
-    """Displacement along it: `at` a point, or the mean one `of` a group of sides, by length."""
+    """Displacement `at` a point, or the mean `of` a group."""
 
     stress: StressComponent | None = None
-    """Stress `at` a point, recovered from the cells around it."""
+    """Stress `at` a point."""
 
     reaction: Axis | None = None
-    """Force of the supports `of` a group along it."""
+    """Reaction `of` a supported group."""
 
     area: fields.Flag | None = None
-    """Growth of the area of the body; `area` alone says so."""
+    """Growth of the area."""
 
     energy: fields.Flag | None = None
-    """Strain energy; `energy` alone says so."""
+    """Strain energy."""
 
     at: PointName | None = None
     """Point."""
@@ -181,10 +181,10 @@ class QuantityConfig(Section):
     """Group of sides."""
 
     expected: Anything | None = None
-    """Value that others give, with its unit: the dataset has errors against it, too."""
+    """Published value, with its unit; the dataset has errors against it."""
 
     source: fields.Text | None = None
-    """Who gives it."""
+    """Source of the published value."""
 
     @model_validator(mode="before")
     @classmethod
@@ -239,32 +239,32 @@ class QuantityConfig(Section):
 
 
 class ShapeLoadConfig(Section):
-    """What is done to a shape, and what is asked of it."""
+    """Supports, forces and quantities of interest."""
 
     supports: dict[str, SupportConfig] = Field(min_length=1, title="a section for each support, by name")
-    """What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."""
+    """By group or point: `fixed`, or displacements such as `{y: 0 mm}`."""
 
     forces: dict[str, ForceVector] = Field({}, title="forces such as [10 kN, 0], by group or point")
-    """Forces along x and y, by group or point: of a group the total one, spread evenly by length."""
+    """By group or point; the total force of a group, spread evenly."""
 
     pressures: dict[str, PressureConfig] = Field({}, title="a stress, or a section, by group")
-    """Pressures, by group; positive towards the body."""
+    """By group; positive towards the body."""
 
     gravity: Gravity = default(["0", "0"])
-    """Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."""
+    """Needs densities."""
 
     quantities: Named[QuantityConfig] = Field(title="a section for each quantity, by name")
-    """Quantities of interest, by name; the first one stands for all where one is wanted."""
+    """Quantities of interest; the first is the main one."""
 
 
 class ShapeFileConfig(Section):
     """A mesh file of a shape that has several."""
 
     file: fields.FileName
-    """The file, relative to the study's folder."""
+    """The mesh file."""
 
     mesh_size: fields.Length
-    """Length of an edge, which names the mesh in the dataset."""
+    """Its name in the dataset."""
 
 
 def _files(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
@@ -284,13 +284,13 @@ def _or_path(schema: dict[str, Any]) -> None:
 
 
 class ShapeConfig(Section):
-    """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
+    """A body from an outline or a mesh file, with named groups and points."""
 
     thickness: fields.Length = default("1 mm")
-    """Extent out of the plane."""
+    """Out of the plane."""
 
     outline: list[SegmentConfig] | None = None
-    """Round of its sides, counter-clockwise."""
+    """Sides, counter-clockwise."""
 
     holes: list[HoleConfig] = []
     """Holes, and parts of other materials."""
@@ -298,25 +298,22 @@ class ShapeConfig(Section):
     file: (
         Annotated[list[ShapeFileConfig], Field(min_length=1, json_schema_extra=_or_path), WrapValidator(_files)] | None
     ) = Field(None, title="the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
-    """Mesh file in the place of an outline, of a format that meshio reads, its path relative to the study's folder;
-    its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the geometry of the
-    reference."""
+    """Mesh file with groups, instead of an outline; or several with their mesh sizes: the reference uses the finest."""
 
     unit: fields.Length = default("1 m")
     """Unit of the coordinates in the file."""
 
     points: dict[str, Place] = Field({}, title="places such as [48 mm, 52 mm], by name")
-    """Named points of an outline or inside of it: particles of every mesh."""
+    """Named points, which are particles of every mesh."""
 
     refined: dict[str, fields.Ratio] = Field({}, title="numbers above 0, by group, point or part")
-    """Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as `{hole: 0.25}`;
-    from there on it grows."""
+    """Relative mesh size at a group, point or part, such as `{hole: 0.25}`."""
 
     parts: dict[str, fields.MaterialName] = Field({}, title="names of materials, by part")
-    """Materials of the parts, by name; the rest is of the grid's material."""
+    """Materials of the parts."""
 
     loads: Named[ShapeLoadConfig] = Field(title="a section for each load, by name")
-    """Loads, by name."""
+    """Loads."""
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Self:
@@ -332,35 +329,32 @@ class ShapeConfig(Section):
 
 
 class ShapeGridConfig(Section):
-    """A product of parameters: every combination of the values listed is a scene of a shape.
-
-    A single value stands for a list of one. A scene that two grids ask for is solved once.
-    """
+    """Every combination of the values is a scene."""
 
     shape: OneOrMore[ShapeName]
-    """Shapes, by name."""
+    """Shapes."""
 
     mesh_size: fields.Lengths | None = None
-    """Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."""
+    """Lengths of edges; not for shapes from files."""
 
     material: OneOrMore[fields.MaterialName]
-    """Materials, by name."""
+    """Materials."""
 
     load: OneOrMore[LoadName] | None = None
-    """Loads of the shapes, by name; all of each shape without."""
+    """Loads; all by default."""
 
     definition: OneOrMore[fields.DefinitionName]
-    """Definitions that derive a stiffness on triangles and need no reference."""
+    """Definitions that derive a stiffness on triangles without a reference."""
 
     kinematics: OneOrMore[fields.Kinematics] = default("nonlinear")
-    """Whether springs keep their length law or their tangent at rest."""
+    """`linear` springs keep their tangent at rest."""
 
     reference: fields.Flag = default("true")
-    """Whether there is a converged reference; else errors are those against `expected` values alone."""
+    """Compute a converged reference; otherwise errors are against `expected` only."""
 
     finite_strain: fields.Flag = default("false")
-    """Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a reference of their
-    law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes seconds."""
+    """Whether nonlinear scenes of `neo-hooke`, `yeoh` and `delingette` also get a reference at finite strain: group
+    `/shapes_finite_strain`. Each takes seconds."""
 
 
 SHAPES_KEY = (
@@ -368,7 +362,7 @@ SHAPES_KEY = (
     Field(
         None,
         title="a section for each shape, by name",
-        description="Shapes: bodies of any outline, or those of mesh files, and their loads.",
+        description="Bodies of any outline, and their loads.",
     ),
 )
 SHAPE_GRIDS_KEY = (
@@ -376,7 +370,7 @@ SHAPE_GRIDS_KEY = (
     Field(
         None,
         title="a section for each grid, by name",
-        description="What is to be computed of the shapes; it makes the group `/shapes`.",
+        description="Grids of shapes: group `/shapes`.",
     ),
 )
 """Types and fields of the sections ``shapes`` and ``shape_grids`` of a study."""

@@ -61,35 +61,35 @@ class EngineSceneConfig(Section):
 
 
 class EngineRunsConfig(Section):
-    """Runs in engines: every combination of the values listed, as in a grid."""
+    """Every combination of the values, as in a grid."""
 
     scene: OneOrMore[SceneName] | None = None
-    """Scenes; all of them without."""
+    """Scenes; all by default."""
 
     definition: fields.DefinitionNames
-    """Definitions that need no reference. One whose energy an engine lacks is a hole that says so."""
+    """Definitions that need no reference. Cells of unsupported energies stay empty, with a reason."""
 
     engine: OneOrMore[EngineName]
-    """Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."""
+    """Keys of `springtune.ENGINES`. Cells of engines that are not installed stay empty."""
 
     iterations: OneOrMore[Count] = default("10")
-    """Iterations of the engine's solver in a step; 1 where an engine has none."""
+    """Solver iterations per step."""
 
     substeps: OneOrMore[Count] = default("1")
-    """Steps of a frame."""
+    """Steps per frame."""
 
     dt: OneOrMore[FrameTime] = default("1/60 s")
-    """Time of a frame, such as 1/60 s."""
+    """Time per frame."""
 
     precision: OneOrMore[Precision] = default(OWN_PRECISION)
-    """Floating-point numbers; `own` is what an engine has by itself."""
+    """`own` is the engine's default."""
 
     stiffness_factor: fields.Ratios = default("1")
-    """Factors on what is typed; several give a sensitivity curve in the engine, and the right one."""
+    """Factors on the typed stiffness; several give a sensitivity curve."""
 
 
 class EnginesConfig(Section):
-    """Scenes in the engines that people run, at the settings that they run them at."""
+    """Scenes in simulation engines, at chosen settings."""
 
     scenes: fields.Named[EngineSceneConfig] = Field(title="a section for each scene, by name")
     """Scenes."""
@@ -98,10 +98,10 @@ class EnginesConfig(Section):
     """Sets of runs."""
 
     frames: Count | None = None
-    """Most frames of a run; by default as many as its motion needs."""
+    """Most frames of a run; by default as many as it needs."""
 
     tolerance: Distance | None = None
-    """Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."""
+    """A run ends at this relative distance from rest; by default 1e-7, in single precision 1e-4."""
 
 
 @dataclass(frozen=True)

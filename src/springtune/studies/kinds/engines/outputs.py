@@ -23,7 +23,7 @@ def _scenes(runs: Iterable[Any]) -> list[list[object]]:
 OUTPUTS = (
     Output(
         "engines",
-        "figures of scenes in engines: error over the time of a frame, maps of settings, sensitivity curves",
+        "errors over frame time, maps of settings, sensitivity curves in engines",
         figures=lambda study: figures(*_scenes(study.parts["engines"])),
         plot="studies.kinds.engines.figures:engines",
         shows="scenes in engines",

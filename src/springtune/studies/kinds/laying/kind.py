@@ -41,20 +41,19 @@ class TrapezoidConfig(Section):
     """A symmetric trapezoid that stands on its lower base."""
 
     lower_base: fields.Length
-    """Length of the base on the floor."""
+    """Base on the floor."""
 
     upper_base: fields.Length
-    """Length of the upper base."""
+    """Upper base."""
 
     height: fields.Length
     """Height."""
 
 
 class LayingConfig(Section):
-    """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
+    """A strip laid on a trapezoid; every combination of the values, as in a grid.
 
-    The reference of a loading and friction is a strip of linear triangles on a mesh of its own. Two coarser meshes give
-    the band of its error.
+    The reference is a strip of finite elements. Two coarser meshes estimate its error.
     """
 
     strip: fields.BeamName
@@ -67,26 +66,26 @@ class LayingConfig(Section):
     """Material of the strip."""
 
     support: fields.MaterialName
-    """Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."""
+    """Material of the trapezoid; rigid from 1e4 times the strip's modulus."""
 
     definition: fields.DefinitionNames
-    """Definitions that derive a stiffness and need no reference."""
+    """Definitions that derive a stiffness without a reference."""
 
     mesh_size: OneOrMore[fields.Length]
     """Lengths of an edge."""
 
     reference_size: fields.Length = default("1 mm")
-    """Length of an edge of the reference's finest mesh."""
+    """Finest mesh size of the finite-element reference."""
 
     loading: OneOrMore[Loading] = default("pressure")
-    """`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws the ends down
-    to the floor."""
+    """`pressure`: follows the upper face; `gravity`: the same force as weight; `ends`: pulls the ends down to the
+    floor."""
 
     pressure: fields.Stress
-    """Pressure, or weight over the upper face."""
+    """Pressure, or weight per upper face."""
 
     friction: OneOrMore[Friction] = default("0")
-    """Coulomb's coefficients of friction."""
+    """Coefficients of friction."""
 
 
 def _check(config, problems):
@@ -162,7 +161,7 @@ LAYING_VARIABLES = {
 
 KIND = Kind(
     "laying",
-    study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid; it makes the group `/laying`.")},
+    study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid: group `/laying`.")},
     check=_check,
     expand=_expand,
     axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in LAID},

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 OUTPUTS = (
     Output(
         "laying",
-        "the figure of laid strips",
+        "laid strips",
         figures=lambda study: {"laying": {}},
         plot="studies.kinds.laying.figures:laying",
         shows="laid strips",

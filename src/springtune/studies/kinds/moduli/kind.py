@@ -20,9 +20,9 @@ from .outputs import OUTPUTS
 
 
 class PatchConfig(Section):
-    """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
+    """The box for effective moduli: between rollers for E and nu, under even shear for G.
 
-    Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
+    Give the extent of the beam to compare with.
     """
 
     length: Length = default("100 mm")
@@ -98,7 +98,7 @@ KIND = Kind(
     study_fields={
         "patch": (
             PatchConfig,
-            Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured."),
+            Field(default_factory=PatchConfig, description="Box for effective moduli."),
         )
     },
     grid_fields={
@@ -106,8 +106,7 @@ KIND = Kind(
             Flag,
             default(
                 "false",
-                description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
-                "Poisson's ratio, on the box under `patch`. Definitions with a given stiffness have none.",
+                description="Measure effective moduli on the box under `patch`.",
             ),
         )
     },

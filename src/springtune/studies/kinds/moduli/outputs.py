@@ -29,7 +29,7 @@ def _lack(study: "Study") -> str:
 OUTPUTS = (
     Output(
         "definitions",
-        "figures and tables that compare definitions",
+        "comparison of definitions",
         figures=_figures,
         plot="studies.kinds.moduli.figures:definitions",
         texts={"which_definition.md": "studies.kinds.moduli.figures:decision"},

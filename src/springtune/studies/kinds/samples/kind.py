@@ -95,7 +95,7 @@ Drawn = dict[str, Any]
 
 
 class ParametersConfig(Section):
-    """Parameters of sampled scenes: each is a value, or a distribution to draw it from.
+    """Each parameter is a value or a distribution.
 
     `{from: 100 mm, to: 400 mm}` is uniform; `{from: 1 MPa, to: 1 GPa, distribution: log-uniform}` has a uniform
     logarithm; `{from: 1 mm, mode: 2 mm, to: 5 mm, distribution: triangular}`; `{from: 32 mm, mean: 40 mm,
@@ -103,19 +103,19 @@ class ParametersConfig(Section):
     """
 
     length: Annotated[Drawn, *distributed("length", "{from: 100 mm, to: 400 mm}")]
-    """Extent along x, the direction of the load."""
+    """Along x."""
 
     height: Annotated[Drawn, *distributed("height", "{from: 20 mm, to: 80 mm}")]
-    """Extent along y."""
+    """Along y."""
 
     thickness: Annotated[Drawn, *distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
-    """Extent out of the plane."""
+    """Out of the plane."""
 
     mesh_size: Annotated[Drawn, *distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
-    """Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."""
+    """At most the smaller side of any beam. Give this or `relative_mesh_size`."""
 
     relative_mesh_size: Annotated[Drawn, *distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
-    """Length of an edge over the height."""
+    """Mesh size over height."""
 
     young_modulus: Annotated[Drawn, *distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
     """Young's modulus E."""
@@ -124,7 +124,7 @@ class ParametersConfig(Section):
     """Poisson's ratio nu."""
 
     force: Annotated[Drawn, *distributed("force", "{from: 1 kN, to: 20 kN}")]
-    """Magnitude of the force. The load's name carries the sign."""
+    """Size of the force. The load gives the sign."""
 
 
 def _power_of_two(size: int) -> int:
@@ -145,9 +145,9 @@ Design = Annotated[str, *one_of("design", DESIGNS)]
 
 
 class SamplesConfig(Section):
-    """Scenes whose parameters are drawn from distributions, and which of these parameters matter, in linear kinematics.
+    """Linear scenes with random parameters, and which parameters matter.
 
-    A sample of twice the size keeps its scenes and adds as many. Stored scenes are not solved again.
+    Doubling `size` keeps the stored scenes.
     """
 
     design: Design = Field(SOBOL_INDICES)
@@ -155,7 +155,7 @@ class SamplesConfig(Section):
     + 2) points; `sobol`: scrambled Sobol points."""
 
     size: Size
-    """Number of points: a power of two. For `sobol-indices`, of base samples."""
+    """Number of points, or of base samples for `sobol-indices`."""
 
     seed: Seed = default("1")
     """Seed of the random numbers."""
@@ -164,13 +164,13 @@ class SamplesConfig(Section):
     """Generated mesh type."""
 
     load: OneOrMore[fields.Load]
-    """Loads; each acts on every point's scene."""
+    """Loads of every scene."""
 
     definition: fields.DefinitionNames
-    """Definitions that derive a stiffness and need no reference."""
+    """Definitions that derive a stiffness without a reference."""
 
     parameters: ParametersConfig
-    """Parameters of the scenes."""
+    """Parameters."""
 
     @property
     def loads(self) -> list[str]:
@@ -331,7 +331,7 @@ def _tables(study):
 
 KIND = Kind(
     "samples",
-    study_fields={"samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples` and `/sobol`.")},
+    study_fields={"samples": optional(SamplesConfig, "Sampled scenes: groups `/samples` and `/sobol`.")},
     alone={"samples": ()},
     check=_check,
     expand=_expand,

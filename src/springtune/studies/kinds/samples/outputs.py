@@ -34,7 +34,7 @@ def _figures(study: "Study") -> dict[str, dict[str, str]]:
 OUTPUTS = (
     Output(
         "sobol",
-        "the figure of Sobol indices of samples",
+        "Sobol indices",
         figures=_figures,
         plot="studies.kinds.samples.figures:sobol",
         job="samples",

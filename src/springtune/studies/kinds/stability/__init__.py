@@ -5,15 +5,15 @@ import numpy as np
 from springtune.mechanics.integrators import INTEGRATORS
 
 EXPERIMENTS = {
-    "limits": "largest stable step of the explicit schemes, predicted and measured",
-    "maps": "what noise becomes over step and damping",
+    "limits": "largest stable time step",
+    "maps": "noise over step and damping",
     "drift": "energy and momentum over many steps",
-    "rest": "steps to rest over damping; truncated solvers; dynamic relaxation",
-    "slivers": "triangles of down to half a degree",
+    "rest": "steps to rest; truncated solvers",
+    "slivers": "angles down to 0.5 degree",
     "contrast": "stiff parts beside soft ones",
-    "poisson": "up to an incompressible material",
-    "sizes": "mesh sizes over three decades, single precision",
-    "strains": "compression and traction of up to 300 %, a follower pressure",
+    "poisson": "up to incompressible",
+    "sizes": "mesh sizes over three decades",
+    "strains": "up to 300 %",
     "perturbation": "particles moved at random, inverted starts",
     "buckling": "a slender column, a shallow arch",
 }

@@ -21,7 +21,7 @@ ExperimentName = Annotated[str, *one_of("experiment", EXPERIMENTS)]
 
 
 class StabilityConfig(Section):
-    """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
+    """Experiments on numerical stability of a beam in traction."""
 
     beam: fields.BeamName
     """Beam."""
@@ -33,18 +33,17 @@ class StabilityConfig(Section):
     """Traction on the right end."""
 
     definition: fields.DefinitionNames
-    """Definitions that derive a stiffness and need no reference; the first one stands for all where an experiment
-    is not about definitions."""
+    """Definitions that derive a stiffness without a reference. Some experiments use only the first."""
 
     mesh_type: fields.MeshType = default("structured")
     """Mesh type of triangles."""
 
     mesh_size: OneOrMore[fields.Length]
-    """Lengths of an edge; most experiments take the coarsest."""
+    """Lengths of edges; most experiments use the coarsest."""
 
     experiment: OneOrMore[ExperimentName] = Field(
         list(EXPERIMENTS),
-        description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
+        description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All by default.",
     )
 
 
@@ -196,9 +195,7 @@ EXPERIMENT_DIMENSIONS: dict[str, str | tuple[str, str]] = {
 
 KIND = Kind(
     "stability",
-    study_fields={
-        "stability": optional(StabilityConfig, "Experiments on numerical stability; they make the group `/stability`.")
-    },
+    study_fields={"stability": optional(StabilityConfig, "Experiments on numerical stability: group `/stability`.")},
     check=_check,
     expand=_expand,
     axes=_axes,

@@ -14,7 +14,7 @@ def figures(experiments: Collection[str]) -> dict[str, dict[str, object]]:
 OUTPUTS = (
     Output(
         "stability",
-        "figures and the page of the experiments on stability",
+        "experiments on stability, with a page",
         figures=lambda study: figures({name for name, _ in study.parts["stability"]}),
         plot="studies.kinds.stability.figures:stability",
         texts={"stability.md": "studies.kinds.stability.figures:page"},
