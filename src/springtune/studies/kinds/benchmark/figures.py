@@ -120,7 +120,7 @@ def page(tree: xr.DataTree) -> str:
         lines += [*markdown_section(f"{scene}: approaches on one mesh size"), *_one_size(cells), ""]
         holes = [*_holes(cells)]
         lines += [*markdown_section(f"{scene}: what has no numbers"), *holes, ""] if holes else []
-    said = "Nonlinear springs that steps advance, in millions a second. Results do not depend on threads."
+    said = "Millions of nonlinear springs that explicit steps advance in a second."
     rates = numbers(data.spring_updates, ".0f", 1e-6).transpose(..., "precision", "thread_count")
     steps = tables.markdown(["mesh_size"], {"{}, threads: {}": rates})
     return "\n".join([*lines, *markdown_section("Explicit steps", said), *steps])

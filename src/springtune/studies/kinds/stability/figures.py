@@ -183,12 +183,12 @@ def _limits(data):
     lagged = limit.sel(integrator="central-difference-lagged").isel(damping_ratio=slice(1, None)) / undamped
     columns = {
         "2/ω_max [ns]": numbers(1e9 * undamped),
-        "bound from particles [ns]": numbers(1e9 * data.dt_particle_bound),
-        "damping {:g} that lags: times": numbers(lagged),
+        "bound without eigenvalue [ns]": numbers(1e9 * data.dt_particle_bound),
+        "relative step, lagged damping {:g}": numbers(lagged),
     }
     said = (
-        f"Over {int(ratio.count())} cases (explicit schemes, dampings, definitions, sizes) the measured limit is "
-        f"within {100 * float(abs(ratio - 1).max()):.2f} % of the predicted one."
+        f"In {int(ratio.count())} cases (explicit schemes, dampings, definitions, sizes) the measured limit differs by "
+        f"at most {100 * float(abs(ratio - 1).max()):.2f} % from the predicted one."
     )
     return _table(["definition", "mesh_size"], columns, "Largest step", said)
 
@@ -206,11 +206,11 @@ def _drift(data):
 def _rest(data):
     ratios, steps = data.critical_ratio.values, data.steps_to_rest.values
     said = (
-        f"Quickest at {ratios[int(np.nanargmin(steps))]:g} of the critical damping, {np.nanmin(steps):.0f} steps; "
-        f"{steps[0]:.0f} at {ratios[0]:g}, {steps[-1]:.0f} at {ratios[-1]:g}."
+        f"Fewest steps: {np.nanmin(steps):.0f}, at {ratios[int(np.nanargmin(steps))]:g} of the critical damping. A run "
+        f"takes {steps[0]:.0f} steps at {ratios[0]:g} and {steps[-1]:.0f} at {ratios[-1]:g}."
     )
     columns = {"{} steps": numbers(data.truncated_error, ".2g")}
-    distances = "Distance of backward Euler from the static solution, by iterations of its linear solver:"
+    distances = "Relative error of backward Euler by iterations of its linear solver:"
     return _table(["mesh_size", "cg_iterations"], columns, "To rest", said, distances)
 
 
