@@ -164,7 +164,7 @@ def png_and_pdf(figure: Figure) -> dict[str, bytes]:
     with matplotlib.rc_context(SETTINGS):
         if engine := figure.get_layout_engine():
             engine.execute(figure)
-            figure.set_layout_engine("none")  # once for both
+            figure.set_layout_engine(None)  # once for both; "none" would draw each file twice
         for ending, options in SAVED_AS.items():
             content = io.BytesIO()
             figure.savefig(content, format=ending, **options)
