@@ -33,7 +33,8 @@ class DamagedError(Exception):
         return Path(self.args[0])
 
     def __str__(self) -> str:
-        return f"{self.args[0]}: {self.args[1]}; delete it, and call the same command again, which makes it anew"
+        remedy = "delete it, and call" if self.path.exists() else "call"
+        return f"{self.args[0]}: {self.args[1]}; {remedy} the same command again, which makes it anew"
 
 
 @contextmanager
