@@ -21,6 +21,7 @@ from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
+from springtune.studies.kinds.bodies.beam_plan import stem
 from springtune.studies.kinds.bodies.kind import summary
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -80,7 +81,7 @@ def read_study(path):
     if len(study.scenes) <= 2_000:
         parts = [(kind, study.parts[kind.name]) for kind in kinds()]
         summary(study, [row for kind, part in parts if part for row in kind.summary(part)])
-        assert all(len(mesh.name) <= 200 for mesh in study.meshes), "a mesh is called as no file can be"
+        assert all(len(stem(mesh)) <= 200 for mesh in study.meshes), "a mesh is called as no file can be"
 
 
 # -- mesh files --------------------------------------------------------------------------------------------------------
