@@ -50,7 +50,7 @@ IN_ENGINES = "which-numbers.md"
 SETTING = ["substeps", "iterations"]
 """Dimensions of a table of engines."""
 
-SHOWN = [1, 5, 20]
+SHOWN = [5, 20]
 """Substeps whose errors the table of engines shows."""
 
 USUAL, GOOD = 10, 0.02
@@ -106,7 +106,7 @@ def in_engines(data: xr.Dataset) -> str:
     """Return the table of the sheet: solver error over substeps, and the converged setting of least work."""
     data = data.sel(scene="sheet")
     head = ["engine", "definition", *(f"{n} substep{'s' if n > 1 else ''}" for n in SHOWN)]
-    head += ["converged from", "ms a frame"]
+    head += ["converged from"]
     rows = [head, ["---"] * 2 + ["---:"] * (len(head) - 2)]
     without = [words(data).index(word) for word in ("not_requested", "absent", "refused", "failed")]
     for engine in data.engine.values:
@@ -135,10 +135,10 @@ def _of_engine(runs: xr.Dataset) -> list[str]:
     work = (runs.substeps * runs.iterations).transpose(*SETTING)
     good = work.where(abs(runs.solver_error.transpose(*SETTING)) <= GOOD)
     if not good.notnull().any():
-        return [*cells, "none tried", ""]
-    best = runs.frame_seconds.transpose(*SETTING).isel(good.argmin(...))
+        return [*cells, "none tried"]
+    best = good.isel(good.argmin(...))
     setting = f"{best.substeps.item()} x {best.iterations.item()}" if len(tried) > 1 else f"{best.substeps.item()}"
-    return [*cells, setting, _short(1e3 * best.item())]
+    return [*cells, setting]
 
 
 def _short(number: float) -> str:
