@@ -75,7 +75,9 @@ def _single(tree: xr.DataTree, output: "Output") -> "Axes":
 
 
 if __name__ == "__main__":
+    import gc
     import os
 
     os.environ["MPLBACKEND"] = "Agg"
+    gc.set_threshold(100_000, 20, 100)  # looking for garbage among figures takes a tenth of the drawing
     main(*sys.argv[1:])

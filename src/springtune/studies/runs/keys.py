@@ -41,24 +41,29 @@ DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fe
 """Distributions with another name than their package; looking one up takes a third of a second."""
 
 
-class _ForComputing(ast.NodeTransformer):
-    """Remove what only readers and type checkers see."""
-
-    def visit(self, node: ast.AST) -> Any:
-        if isinstance(node, ast.Pass) or (
-            isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+def _computing(statements: list[ast.stmt]) -> list[ast.stmt]:
+    """Statements without what only readers and type checkers see; expressions hold no statements to look at."""
+    kept: list[ast.stmt] = []
+    for one in statements:
+        if isinstance(one, ast.Pass) or (
+            isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant) and isinstance(one.value.value, str)
         ):
-            return None
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in (getattr(node.test, one, "") for one in ("id", "attr")):
-            return [kept for one in node.orelse if (kept := self.visit(one))]
-        if isinstance(node, ast.Constant):
-            node.kind = None  # u"" is ""
-        return self.generic_visit(node)
+            continue
+        if isinstance(one, ast.If) and "TYPE_CHECKING" in (getattr(one.test, name, "") for name in ("id", "attr")):
+            kept += _computing(one.orelse)
+            continue
+        for part in (one, *getattr(one, "handlers", ()), *getattr(one, "cases", ())):
+            for name in ("body", "orelse", "finalbody"):
+                if hasattr(part, name):
+                    setattr(part, name, _computing(getattr(part, name)))
+        kept.append(one)
+    return kept
 
 
 def computing(text: str | bytes) -> ast.Module:
     """Parse source code without comments, docstrings, `pass` and type-checking code."""
-    tree: ast.Module = _ForComputing().visit(ast.parse(text))
+    tree = ast.parse(text)
+    tree.body = _computing(tree.body)
     return tree
 
 
