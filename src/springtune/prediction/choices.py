@@ -350,10 +350,9 @@ def beam_statements(
     """Statements of 1 N in linear kinematics, one for each load."""
     is_a(mesh, Mesh, "mesh", A_MESH)
     is_a(material, Material, "material", A_MATERIAL)
-    found: list[BeamStatement] = []
-    for load in check_loads(loads):
-        found.append(BeamStatement(beam, mesh, material, load, 1.0, "linear", found[0].sheet if found else None))
-    return found
+    first, *others = check_loads(loads)
+    one = BeamStatement(beam, mesh, material, first, 1.0, "linear")
+    return [one, *(BeamStatement(beam, mesh, material, load, 1.0, "linear", one.sheet) for load in others)]
 
 
 def as_sure_as(known: Mapping[str, Any]) -> float:

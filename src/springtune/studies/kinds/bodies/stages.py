@@ -65,9 +65,9 @@ def _solve_tasks(study):
     if shapes := study.shapes:
         kept = shape_plan.shown(shapes) if DRAWING in study.outputs else ()
         for scenes in shape_plan.by_mesh(shapes).values():
+            name = file_name(scenes[0])
             shared = {"shape": beam_plan.parameters(shape_plan.source_of(shapes.shape[scenes[0].shape]))}
             for task in (shape_plan.scene_task(shapes, one, kept) for one in scenes):
-                name = file_name(scenes[0])
                 yield Task(task, name=name, file=name, shared=shared, key=task["key"])
 
 
