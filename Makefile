@@ -26,11 +26,15 @@ report: study
 paper: $(VENV)/.run
 	snakemake paper
 
+# The rooms of src/springtune, and the pages.
+TESTS := $(addprefix tests/,mechanics reference scene springs engines prediction handover studies cli mesh linalg problem safe_io docs) \
+    $(wildcard tests/test_*.py)
+
 # Files in this order, those that take longest first: at the end no core waits for the other.
 # A process that crashes ends the run: pytest-xdist 3.8 hangs if it starts another one.
 test: $(VENV)/.test
-	pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
-	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
+	pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns $(TESTS) src
+	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/mechanics/test_statics.py tests/mechanics/test_series.py tests/mechanics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
 test-browser: $(VENV)/.test
@@ -42,7 +46,7 @@ ENGINES := build/engines
 ENGINES_STUDY ?= config/engines.yaml
 WITH_ENGINES = PYTHONPATH="$(CURDIR)/src:$(CURDIR)/$(ENGINES)"
 # Those of Newton first, since it compiles: at the end no core waits for the other.
-ENGINE_TESTS = $(wildcard tests/engines/test_newton*.py) $(filter-out tests/engines/test_newton%,$(wildcard tests/engines/test_*.py))
+ENGINE_TESTS = $(wildcard tests/programs/test_newton*.py) $(filter-out tests/programs/test_newton%,$(wildcard tests/programs/test_*.py))
 test-engines: $(VENV)/.test $(ENGINES)/.done
 	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -rs -m "not slow" $(ENGINE_TESTS)
 	$(if $(ENGINES_STUDY),$(WITH_ENGINES) springtune run $(ENGINES_STUDY))
@@ -77,10 +81,10 @@ $(MUTANTS): | $(VENV)/.test
 INPUTS ?= 20000
 SEED ?= 1
 slow: $(VENV)/.test $(ENGINES)/.done
-	pytest -n 2 -m slow tests/workflow tests/fuzz tests/physics tests/unit src
-	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
-	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile -rs -m slow tests/engines
-	pytest -n 2 tests/faults tests/reruns
+	pytest -n 2 -m slow tests/workflow tests/fuzz $(TESTS) src
+	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" $(TESTS)
+	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile -rs -m slow tests/programs
+	pytest -n 2 tests/reruns
 	OPENBLAS_NUM_THREADS=1 python tests/fuzz/fuzz.py $(INPUTS) $(SEED)
 	pytest -rs tests/versions tests/release
 

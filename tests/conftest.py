@@ -3,6 +3,7 @@
 import importlib
 import os
 import sys
+from functools import partial
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -34,3 +35,19 @@ def mesh_library(request, monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", package)
     assert library() is package and request.param in package.__file__
     return package
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Load a study from its text, in a folder of the test."""
+    import campaigns  # with numpy, after the settings above
+
+    return partial(campaigns.load_text, tmp_path)
+
+
+@pytest.fixture
+def refusal(tmp_path):
+    """Message that the text of a study gets, in a folder of the test."""
+    import campaigns  # with numpy, after the settings above
+
+    return partial(campaigns.refusal, tmp_path)

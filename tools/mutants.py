@@ -34,12 +34,14 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "src/springtune"
 FOLDER = REPOSITORY / "build/mutants"
 
-MODULES = ("springs/*.py", "mechanics/energies.py", "mechanics/newton.py", "mechanics/statics.py",
-           "studies/runs/keys.py", "studies/runs/checked_json.py")  # fmt: skip
+MODULES = ("springs/*.py", "mechanics/*.py", "reference/*.py", "mesh/*.py", "studies/runs/keys.py")
 """What is mutated: where a wrong sign gives a wrong number that looks like a right one."""
 
-TESTS = ("tests/physics", *(f"tests/unit/test_{name}.py" for name in (
-    "dependencies", "labels", "materials", "places", "records", "scene")))  # fmt: skip
+TESTS = (
+    *(f"tests/{room}" for room in ("problem", "mesh", "springs", "mechanics", "linalg", "reference", "scene")),
+    *("tests/prediction", "tests/handover", "tests/engines", "tests/studies/kinds/test_benchmark.py"),
+    *("tests/studies/runs/test_keys.py", "tests/studies/output/test_labels.py", "tests/test_places.py"),
+)
 """What may find a mutant: tests that are not slow, and that run in one process."""
 
 OPERATORS = (

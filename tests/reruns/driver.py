@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 import xarray as xr
 
-sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
+sys.path.append(str(Path(__file__).parents[1] / "support"))  # for `campaigns`, where this is a program
 
 from springtune.mesh import MESH_TYPES
 from springtune.studies.runs import attempts, rerun

@@ -155,9 +155,14 @@ def test_the_paper_study_is_the_same_on_every_processor(name, tmp_path):
     assert_same_datasets(REPOSITORY / "config/paper.yaml", tmp_path, environments, CURVE_TOLERANCE, follows)
 
 
-def physics(python, tests="tests/physics", **environment):
-    """Run the physics tests by a Python, and assert that they hold."""
-    call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider", tests]
+PHYSICS = [f"tests/{room}" for room in ("problem", "mesh", "springs", "mechanics", "linalg", "reference", "scene",
+                                        "prediction", "handover", "engines")]  # fmt: skip
+
+
+def physics(python, *tests, **environment):
+    """Run tests, or else those of the physics, by a Python, and assert that they hold."""
+    call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider"]
+    call += tests or PHYSICS
     here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"} | environment
     done = subprocess.run(call, cwd=REPOSITORY, env=here, capture_output=True, text=True)
     print(done.stdout.splitlines()[-1:])
@@ -199,7 +204,7 @@ def test_every_python_agrees_with_the_newest_packages(version, study, usual, tmp
 def test_springs_hold_in_mujoco_3(version, tmp_path):
     """The oldest one that is supported, and the last of version 3."""
     python = environment(tmp_path / "venv", sys.executable, [*NEEDED, f"mujoco=={version}"])
-    for tests in ("tests/physics/test_simulators.py", "tests/engines/test_mujoco_engine.py"):
+    for tests in ("tests/handover/test_simulators.py", "tests/programs/test_mujoco_engine.py"):
         physics(python, tests)
 
 

@@ -25,11 +25,11 @@ SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "ki
 
 @pytest.fixture(scope="module")
 def tree(run, repository):
-    """By its jobs in this process; tests/unit/test_figures.py draws the other figures."""
+    """By its jobs in this process; tests/studies/output/test_figures.py draws the other figures."""
     content = yaml.safe_load((repository / "config/quick.yaml").read_text())
     content["outputs"] = ["size", "paraview", "tables"]
-    del content["samples"]  # tests/unit/test_samples.py has them
-    content["stability"]["experiment"].remove("slivers")  # tests/unit/test_stability.py has them
+    del content["samples"]  # tests/studies/kinds/test_samples.py has them
+    content["stability"]["experiment"].remove("slivers")  # tests/studies/kinds/test_stability.py has them
     content["benchmark"]["mesh_size"] = "5 mm"
     run.write("quick.yaml", yaml.safe_dump(content, sort_keys=False))
     with contextlib.chdir(run.folder):

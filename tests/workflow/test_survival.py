@@ -51,7 +51,7 @@ def test_who_only_looks_changes_nothing(finished):
 
 
 def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
-    """As Snakemake writes locks, of the study's collect; what else becomes of locks: tests/unit/test_locks.py."""
+    """As Snakemake writes locks, of the study's collect; others are in tests/studies/runs/test_locks.py."""
     locks = finished.folder / ".snakemake/locks"
     locks.mkdir(parents=True, exist_ok=True)
     (locks / "0.output.lock").write_text(f"{finished.folder}/results/survival/dataset.nc\n")

@@ -26,7 +26,7 @@ from tables import STUDIES
 
 STEEL = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
 
-CONTRIBUTING = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text()
+CONTRIBUTING = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text()
 
 RECIPES = {
     recipe.partition("\n")[0].removeprefix("# ").replace("src/springtune/", ""): recipe

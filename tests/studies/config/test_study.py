@@ -25,7 +25,7 @@ from springtune.studies.kinds import load_study
 
 from tables import STUDIES, refused_files, study_text
 
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[3] / "config"
 LATTICE = math.sqrt(3) / 2
 SMALL = STUDIES["small"]
 changed = partial(study_text, "small")
@@ -433,7 +433,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_study_is_refused_with_line_key_and_remedy(refusal, tmp_path, case):
     study, old, new, *parts = REFUSED[case]
-    for path in (HERE.parents[1] / "config/treloar").glob("*.csv"):
+    for path in (CONFIG / "treloar").glob("*.csv"):
         shutil.copy(path, tmp_path)
     (tmp_path / "own.msh").write_text("any")
     changes = zip(old, new) if isinstance(old, list) else [(old, new)]

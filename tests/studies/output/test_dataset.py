@@ -276,7 +276,7 @@ def write_curves(path, value):
 
 
 class TestInterruptedWrite:
-    """Kills wherever a file is renamed, and full disks of a whole run, are tests/faults's."""
+    """Kills wherever a file is renamed, and full disks of a whole run, are tests/reruns/test_faults.py's."""
 
     CROWDED = "import sys, resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
     CROWDED += "from test_dataset import write_curves; write_curves(sys.argv[1], 2.0)"

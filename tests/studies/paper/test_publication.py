@@ -19,7 +19,7 @@ from springtune.studies.paper.numbers import numbers, read, table
 
 import synthetic
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 PAPER = REPOSITORY / "workflow/paper"
 ATTRIBUTES = {
     "title": "All kinds",

@@ -30,7 +30,7 @@ from springtune.studies.runs.rerun import output_files
 from campaigns import do_stages, load_text
 from tables import STUDIES
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 COOK = STUDIES["shapes"]
 
 

@@ -20,7 +20,7 @@ from springtune.studies.runs.provenance import inputs
 from campaigns import Campaign, load_text
 from tables import STUDIES
 
-TRELOAR = Path(__file__).parents[2] / "config/treloar"
+TRELOAR = Path(__file__).parents[3] / "config/treloar"
 
 
 STUDY = STUDIES["rubber"]

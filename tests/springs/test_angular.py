@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from test_definitions import errors, patch
 
 from periodic import periodic_delaunay
 from springtune.mechanics.energies import AngleEnergy, BiquadraticEnergy
@@ -10,7 +11,6 @@ from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, Springs
 from springtune.springs.ielsm import angle_moduli
 from springtune.springs.normal_shear import slip_form
-from test_definitions import errors, patch
 
 from problems import free_network
 

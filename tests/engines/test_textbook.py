@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+import test_xpbd as of_energies
 from scipy.linalg import expm
 
 import springtune as st
-import test_engines_xpbd as of_energies
 from springtune.engines import pbd, run
 from springtune.engines.base import ENGINES
 from springtune.handover.simulation import network_of

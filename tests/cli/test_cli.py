@@ -286,7 +286,7 @@ class TestPredict:
         names = {"van-gelder-general", "element-fit", "patch-area", "patch", "energy-fit"}
         assert list(rows)[0] == "definition" and set(rows) == {"definition", *names}
         assert "+0.00 %" in rows["patch"]
-        # Traction, bending and shear as in tests/physics/test_predict.py, in order of the worst of them.
+        # Traction, bending and shear as in tests/prediction/test_choices.py, in order of the worst of them.
         assert rows["patch-area"].split("N/m")[2].split()[:6] == ["+0.45", "%", "-6.31", "%", "+1.60", "%"]
         worst = [max(abs(float(word)) for word in line.split(" %")[0:3] for word in word.split()[-1:]) for line in
                  list(rows.values())[1:]]  # fmt: skip

@@ -253,7 +253,7 @@ def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(colle
     for version in ("1.0", "2.0"):
         (folder / f"{ABSENT}-{version}.dist-info").mkdir(parents=True)
         (folder / f"{ABSENT}-{version}.dist-info/METADATA").write_text(f"Name: {ABSENT}\nVersion: {version}\n")
-        (folder / f"{ABSENT}.py").write_text("from test_engine_studies import Toy\n")
+        (folder / f"{ABSENT}.py").write_text("from test_engine_runs import Toy\n")
         for old in set(folder.glob("*.dist-info")) - {folder / f"{ABSENT}-{version}.dist-info"}:
             (old / "METADATA").unlink()
             old.rmdir()

@@ -4,7 +4,7 @@ import json
 import re
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 TIGHT = re.compile(r"(?:<=?\s*|>=?\s*|\+ |- |\b[ar]tol=|_tol=|rel=|abs=|clip\()\d(?:\.\d+)?e-(?:1\d|2\d)\b")
 COMPARES = re.compile(r"\bassert\b|approx\(|allclose|\b[ar]tol=|rel_tol=")
 

@@ -10,10 +10,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from pypdf import PdfReader
+from test_figures import EVERY_PLOT, closed, each  # noqa: F401  # a fixture of that file
 
 from springtune.studies.output import labels, style
 from springtune.studies.output.style import png_and_pdf
-from test_figures import EVERY_PLOT, closed, each  # noqa: F401  # a fixture of that file
 
 from synthetic import dataset
 

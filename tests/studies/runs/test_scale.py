@@ -18,7 +18,7 @@ from springtune.studies.runs import rerun, store
 
 from campaigns import do_stages, load_text
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 
 
 @pytest.mark.slow

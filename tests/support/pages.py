@@ -127,7 +127,7 @@ def follow(page, folder, run=None):
         elif block.language == "yaml":
             assert yaml.safe_load(block.code)
             write_study(block.code, folder)
-        elif block.language == "py":  # programs of others, which tests/engines runs
+        elif block.language == "py":  # programs of others, which tests/programs runs
             compile(block.code, page.name, "exec")
         elif block.language == "toml":
             assert block.code in (REPOSITORY / "examples/plugin/pyproject.toml").read_text()
