@@ -16,7 +16,6 @@ __version__ = "0.1.0"
 
 _NAMES = {
     "engines.base": ("ENGINES", "Engine", "EngineError", "Setting", "engine"),
-    "engines.budget": ("BudgetChoice", "BudgetSearch", "fit_budget"),
     "engines.calibration": ("EngineFit", "LoadBand", "NeededSetting", "fit_engine"),
     "engines.run": ("EngineResult", "in_engine"),
     "handover.net": ("SpringNet",),

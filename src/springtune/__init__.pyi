@@ -5,9 +5,6 @@ from .engines.base import Engine as Engine
 from .engines.base import EngineError as EngineError
 from .engines.base import Setting as Setting
 from .engines.base import engine as engine
-from .engines.budget import BudgetChoice as BudgetChoice
-from .engines.budget import BudgetSearch as BudgetSearch
-from .engines.budget import fit_budget as fit_budget
 from .engines.calibration import EngineFit as EngineFit
 from .engines.calibration import LoadBand as LoadBand
 from .engines.calibration import NeededSetting as NeededSetting

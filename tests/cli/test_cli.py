@@ -24,7 +24,6 @@ from counting import counted
 from springtune.cli import COMMANDS, Commands, Shown, main
 from springtune.cli.recommendation import beam_subject, prediction_text
 from springtune.handover.formats import NET_FORMATS
-from springtune.handover.simulation import simulate
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
 from springtune.prediction import choices as of_one_mesh
@@ -440,33 +439,6 @@ class TestPredictAMesh:
         assert "in 4 orders of the same particles" in result.stdout and "take more substeps" in result.stdout
         assert result.exit_code == 1 and not [*tmp_path.iterdir()]
         assert result.stderr.startswith("Error: --write: there is no factor, so nothing is written: the error at dt")
-
-    def test_a_budget_is_searched(self, tmp_path):
-        """In so long a frame that any machine has time for all settings."""
-
-        @springtune.engine("at-once", precisions=("float64",), iterates=False)
-        class AtOnce:
-            """The equilibrium."""
-
-            def __init__(self, net, setting, damping):
-                self.moved = simulate(net, "at-once").displacements
-
-            def advance(self, frames):
-                pass
-
-            def displacements(self):
-                return self.moved
-
-        asked = [
-            *("--engine", "at-once", "--budget", "10 s", "--beam", "200x40", "--mesh", "free", "--material", "rubber"),
-            *("--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N", "--loads", "traction"),
-        ]
-        try:
-            result = run("predict", *asked, "--write", tmp_path / "net.csv")
-        finally:
-            springtune.ENGINES.discard("at-once")
-        assert result.exit_code == 0 and (tmp_path / "net.csv").exists(), result.output
-        assert "chosen, the least error at worst:" in result.stdout
 
     @pytest.mark.parametrize("command", ["predict", "springs"])
     def test_help_has_the_ending_of_every_format(self, command):

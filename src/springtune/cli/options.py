@@ -64,12 +64,11 @@ MEANINGLESS_BESIDE = {
     "material": ("young", "poisson"),
     "error": ("size", "best_springs", "engine"),
     "engine": ("best_springs",),
-    "budget": ("size", "substeps", "iterations", "definition"),
 }
 """Options that another one stands in for: it has, or finds, what they say."""
 
 MEANINGLESS_WITHOUT = {"scale": ("study", "engine"), "force": ("load", "engine")} | dict.fromkeys(
-    ("dt", "substeps", "iterations", "precision", "definition", "within", "budget"), ("engine",)
+    ("dt", "substeps", "iterations", "precision", "definition"), ("engine",)
 )
 """Options that mean nothing without others, where a command has these."""
 

@@ -26,8 +26,6 @@ ENGINE_OPTIONS: Options = {
     "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
     "scale": {"type": float, "default": 1.0, "help": "Factor on the load of a shape.  [default: 1]"},
     "definition": {"help": "Rule for stiffness.  [default: best]"},
-    "within": {"default": "5 %", "help": "Error for which ranges of loads are printed.  [default: 5 %]"},
-    "budget": {"help": "Time of a frame here, such as '2 ms': find the mesh, definition, substeps and iterations."},
 }
 """Options of `predict` that are of engines, as click takes them."""
 
@@ -47,8 +45,6 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
         'springtune predict --study config/shapes.yaml:cook --material third --error "2 %"',
         'springtune predict --engine xpbd --dt 1/60 --substeps 20 --iterations 10 --beam 200x40 --size "13 mm" '
         '--material rubber --density "1000 kg/m^3" --load traction --force "0.2 N"',
-        'springtune predict --engine xpbd --budget "0.2 ms" --beam 200x40 --material rubber --density "1000 kg/m^3" '
-        '--load traction --force "0.2 N"',
     )
 )
 @sheet_options(
@@ -90,7 +86,7 @@ def predict(
     A shape of a study has errors in the quantities that its load case asks for.
 
     With --engine: what to type into an engine at a setting, so that the displacement under --load is that of finite
-    elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
+    elements; the error under other loads; and which settings converge.
     """
     from .recommendation import written_text
 
@@ -193,47 +189,29 @@ def _recommended_net(body: Asked, definition: str | None, loads: Any, none: str)
 def _in_engine(
     sheet: dict[str, Any], options: dict[str, Any], load: str | None, loads: list[str] | None, springs_alone: bool
 ) -> Answer:
-    """Calibration of an engine, or a search within a budget."""
+    """Calibration of an engine."""
     from ..engines.base import ENGINES, Setting
-    from ..engines.budget import fit_budget, graded_meshes, runnable
-    from ..engines.calibration import fit_engine
+    from ..engines.calibration import fit_engine, runnable
     from ..prediction.choices import CASES
-    from ..problem.quantities import positive
     from ..scene.sheet import chosen
     from ..scene.single import Scene
-    from .recommendation import budget_text, fit_text
+    from .recommendation import fit_text
 
-    engine, searched = chosen(ENGINES, options["engine"], "engine"), options["budget"] is not None
+    engine = chosen(ENGINES, options["engine"], "engine")
     names = ("dt", "substeps", "iterations", "precision")
     setting = Setting(**{name: options[name] for name in names if options[name] is not None})
     engine.check(setting)
-    body = asked(sheet, load, sized=not searched)
+    body = asked(sheet, load)
     if body.load is None:
         raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
-    how: dict[str, Any] = {"loads": loads, "within": options["within"]}
-    case, scale = (body.material, body.load, options["force"]), options["scale"]
-    if searched:
-        if body.is_beam and sheet["mesh"] is not None:
-            how["mesh_types"] = sheet["mesh"].split(",")
-        elif not body.is_beam and body.body.file:
-            how["meshes"] = {body.mesh_name: body.mesh}
-        elif not body.is_beam:
-            how["meshes"] = graded_meshes(body.body, "free", partial(body.make, "free"))
-        limit = positive(options["budget"], "time", "budget")
-        how |= {"dt": setting.dt, "precision": setting.precision, "scale": scale, "springs_alone": springs_alone}
-        search = fit_budget(body.body, *case, engine=engine.name, budget=limit, **how)
-        if search.best is None:
-            return budget_text(search), partial(_unfitted, "take a larger budget")
-        return budget_text(search), search.best.fit.net
-    make = partial(Scene, body.body, body.mesh, *case, scale=scale)
-    tried: tuple[str, ...] = ()
+    make = partial(Scene, body.body, body.mesh, body.material, body.load, options["force"], scale=options["scale"])
     if options["definition"] is not None:
-        scenes, refused = [make(definition=options["definition"])], ""
+        scene, refused, tried = make(definition=options["definition"]), "", ()
     else:
-        scenes, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
-    if not scenes:
+        scene, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
+    if scene is None:
         raise click.ClickException(refused)
-    fit = fit_engine(scenes[0], engine.name, setting, **how)
+    fit = fit_engine(scene, engine.name, setting, loads=loads)
     text = fit_text(fit, body.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
     return text, fit.net if fit.factor == fit.factor else partial(_unfitted, fit.message)
 

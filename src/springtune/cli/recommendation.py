@@ -13,7 +13,6 @@ from ..problem.shapes import QUANTITY_UNITS
 from ..safe_io.tables import TabledList, aligned, mesh_size_text
 
 if TYPE_CHECKING:
-    from ..engines.budget import BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
     from ..prediction.choices import Choice
@@ -193,6 +192,8 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
 
 def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     """Text of a calibration."""
+    from ..engines.calibration import WITHIN
+
     about, mesh = fit.scene.statement, fit.scene.mesh
     lines = [
         f"{about.body}, {mesh_name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
@@ -202,21 +203,13 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     if fit.bands:
         converging = "" if len(fit.bands) == 1 else ": of others than the first, at what moves finite elements as far"
         lines += ["", f"errors at shares of a load{converging}:", aligned(fit.bands.table(), left=2)]
-        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > one.within / 2]
+        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > WITHIN / 2]
         hides = f"The factor hides from {fit.scene.load} that the solver has not converged, not from {', '.join(off)}."
         lines += [hides] if off else []
     if fit.needed:
         lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
         lines.append(aligned(fit.needed.table(), left=2))
     return "\n".join(lines)
-
-
-def budget_text(search: "BudgetSearch") -> str:
-    """Text of a search within a budget."""
-    if search.best is None:
-        least = error_text(search[0].worst).lstrip("+")
-        return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
-    return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
 
 
 def written_text(net: "SpringNet", written: Iterable[Path]) -> str:

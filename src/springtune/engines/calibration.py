@@ -14,22 +14,22 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import NOT_COMPUTED, SpringNet
-from ..prediction.choices import check_loads, check_names, predicted
-from ..prediction.search import asked_error
+from ..prediction.choices import check_loads, check_names, predicted, trial
 from ..problem.compare import error_text
 from ..problem.loads import LOADS
+from ..problem.shapes import Shape
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement, unit_reference
 from .base import ENGINES, Engine, EngineError, Setting
-from .run import DRIFT, EngineResult, complete, in_engine, net_of
+from .run import DRIFT, EngineResult, complete, drift, in_engine, net_of
 
 SIZES = (0.25, 0.5, 1.0, 2.0)
 """Sizes of a load that a calibration is tried on, over its own."""
 
 WITHIN = 0.05
-"""Error that a band keeps, and how far orders of the particles may differ from each other."""
+"""Error up to which orders of the particles may differ from each other, and loads from a converged setting."""
 
 TUNED, ALLOWED = 1e-3, 0.02
 """Error at which a factor is taken, and above which it is refused where nothing comes closer."""
@@ -68,15 +68,8 @@ class LoadBand(Tabled):
         In the engine at each size [1]; NaN where it does not come to rest.
     definition_error : float
         Of the network's equilibrium without a factor, at the third size [1]: what a converged setting would have.
-    within : float
-        Error that the range keeps [1].
-    least, most : float
-        Range of sizes over which the error stays within it; NaN where there is none. It lies between tested sizes, and
-        has a margin for what is between them.
     message : str
         Why there is no error.
-    unit : str
-        Of the sizes; empty for factors.
 
     Examples
     --------
@@ -85,23 +78,17 @@ class LoadBand(Tabled):
     >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
     >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["bending", "shear"], needed=False)
     >>> for band in fit.bands:
-    ...     there = f"{band.least:.3g} to {band.most:.3g} N" if band.least == band.least else "nowhere"
-    ...     print(f"{band.load} {100 * band.error:+.0f} %, within {100 * band.within:g} % {there}; "
-    ...           f"converged {100 * band.definition_error:+.0f} %")
-    traction -0 %, within 5 % 0.05 to 0.4 N; converged +0 %
-    bending -35 %, within 5 % nowhere; converged -35 %
-    shear -17 %, within 5 % nowhere; converged -14 %
+    ...     print(f"{band.load} {100 * band.error:+.0f} %, converged {100 * band.definition_error:+.0f} %")
+    traction -0 %, converged +0 %
+    bending -35 %, converged -35 %
+    shear -17 %, converged -14 %
     """
 
     load: str
     sizes: tuple[float, ...]
     errors: tuple[float, ...]
     definition_error: float
-    within: float
-    least: float
-    most: float
     message: str = ""
-    unit: str = "N"
 
     @property
     def error(self) -> float:
@@ -113,8 +100,6 @@ class LoadBand(Tabled):
         for share, error in zip(SIZES, self.errors):
             yield f"x {share:g}", error_text(error) if error == error else "no rest"
         yield "converged", error_text(self.definition_error) if self.definition_error == self.definition_error else ""
-        there = f"{number_text(self.least, self.unit)} to {number_text(self.most, self.unit)}"
-        yield f"within {100 * self.within:g} %", there if self.least == self.least else "nowhere"
         yield "reason", self.message
 
 
@@ -296,11 +281,11 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         others = range(1, TRIED_ORDERS if ENGINES[self.engine].iterates else 1)
         return [self[factor, setting], *(self.under(self.scene, factor, setting, order) for order in others)]
 
-    def spread(self, factor: float, setting: Setting, within: float) -> tuple[tuple[float, float], str]:
+    def spread(self, factor: float, setting: Setting) -> tuple[tuple[float, float], str]:
         """Least and largest error over these orders, and why no factor is right where they are too far apart."""
         errors = np.array([one.error for one in self.orders(factor, setting)])
         low, high = float(errors.min()), float(errors.max())
-        if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= within:
+        if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= WITHIN:
             return (low, high), ""
         between = f"is {error_text(low)} to {error_text(high)}" if low == low else "has no end in some"
         return (low, high), (
@@ -320,7 +305,6 @@ def fit_engine(
     engine: str,
     setting: Setting | None = None,
     *,
-    within: float | str = WITHIN,
     loads: Iterable[str] | None = None,
     needed: bool = True,
     frames: int | None = None,
@@ -335,8 +319,6 @@ def fit_engine(
     engine : str
         Key of `springtune.ENGINES`.
     setting : Setting, optional
-    within : float or str, optional
-        Error that bands keep, a fraction or a text such as ``"5 %"``.
     loads : iterable of str, optional
         Loads besides the scene's that get a band; by default all of a beam but those that turn, or all of a shape.
     needed : bool, optional
@@ -357,14 +339,13 @@ def fit_engine(
     EngineError
         If the engine is not installed or lacks what the scene has, or the load has no displacement.
     ValueError
-        If `within` is out of its range.
+        If a load is unknown.
 
     Notes
     -----
     One factor is on all stiffnesses and moduli. It is found by Brent's method in the softness, 1 over the factor, in
     which displacements are nearly straight, between factors that are 8 times apart. Other loads of a beam have the
-    force that moves the reference as far as the scene's does. Errors between tested sizes are interpolated; a band has
-    a margin of twice what a parabola through neighbours differs from the line.
+    force that moves the reference as far as the scene's does.
 
     Examples
     --------
@@ -387,7 +368,6 @@ def fit_engine(
     nan 8.61 mm in place of 1.00
     """
     chosen = ENGINES[engine]
-    within = asked_error(within, "within")
     setting = complete(chosen, setting or Setting(**parts))
     chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
@@ -395,11 +375,11 @@ def fit_engine(
     untuned = runs[1.0, setting]
     if not abs(untuned.reference) > 0:
         raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
-    spread, why = runs.spread(1.0, setting, within)
+    spread, why = runs.spread(1.0, setting)
     factor, why = (np.nan, why) if why else _factor(runs, setting)
     tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=_distance)
     if factor == factor:
-        spread, why = runs.spread(factor, setting, within)
+        spread, why = runs.spread(factor, setting)
         factor, tuned = (np.nan, untuned) if why else (factor, tuned)
     found = factor == factor
     why = why or ("" if _rests(tuned) else tuned.message)
@@ -413,7 +393,7 @@ def fit_engine(
         tuned,
         untuned,
         {name: value for name, value in numbers.items() if name in chosen.parameters},
-        TabledList(_band(runs, name, tuned, within, spread) for name in names if found),
+        TabledList(_band(runs, name, tuned) for name in names if found),
         TabledList(_needed(runs, name, setting) for name in raised if needed),
         "; ".join(filter(None, (why, scene.objection))),
         spread,
@@ -525,43 +505,45 @@ def _loaded(scene: Scene, load: str, size: float) -> Scene:
     return make(scene.beam, scene.mesh, scene.material, load, size)
 
 
-def _band(runs: _Runs, load: str, tuned: EngineResult, within: float, spread: tuple[float, float]) -> LoadBand:
-    """Band of a load: the engine at each size, with the factor; other orders of particles narrow its range."""
-    scene = runs.scene
-    base, nothing = scene.statement.size, (np.nan,) * len(SIZES)
-    unit = "" if isinstance(scene.statement, ShapeStatement) else "N"
+def _band(runs: _Runs, load: str, tuned: EngineResult) -> LoadBand:
+    """Errors of the engine with the factor under a load of several sizes."""
+    scene, nothing = runs.scene, (np.nan,) * len(SIZES)
+    base = scene.statement.size
     try:
-        if unit and load != scene.load:
+        if load != scene.load and not isinstance(scene.statement, ShapeStatement):
             moved = unit_reference(scene.beam, scene.material, LOADS[load].kind, 1.0).displacement
             base = abs(tuned.reference / moved)
         sizes = tuple(float(share * base) for share in SIZES)
         found = [runs.under(_loaded(scene, load, size), tuned.factor, tuned.setting) for size in sizes]
     except (ValueError, ReferenceNotConvergedError) as error:
-        return LoadBand(load, nothing, nothing, np.nan, within, np.nan, np.nan, str(error), unit)
+        return LoadBand(load, nothing, nothing, np.nan, str(error))
     errors = tuple(one.error if _rests(one) else np.nan for one in found)
     why = next((one.message for one in found if not _rests(one)), "")
     why = why or next((one.drifts for one in found if abs(one.drift) > DRIFT), "")
-    apart = max(abs(one - tuned.error) for one in spread)
-    definition_error = found[SIZES.index(1.0)].definition_error
-    least, most = range_within(np.array(sizes), np.array(errors), within - apart)
-    return LoadBand(load, sizes, errors, definition_error, within, least, most, why, unit)
+    return LoadBand(load, sizes, errors, found[SIZES.index(1.0)].definition_error, why)
 
 
-def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
-    """Return the range of sizes, about the least error, whose interpolated error and its margin are within."""
-    widths = np.diff(sizes)[:, np.newaxis]
-    slopes = np.diff(errors) / np.diff(sizes)
-    bends = np.pad(np.abs(np.diff(slopes) / (sizes[2:] - sizes[:-2])), 1, constant_values=np.nan)
-    bend = np.fmax(bends[:-1], bends[1:])[:, np.newaxis]
-    share = np.linspace(0, 1, 200)  # between two sizes
-    between = errors[:-1, np.newaxis] * (1 - share) + errors[1:, np.newaxis] * share
-    bounds = np.abs(between) + 2 * bend * widths**2 * share * (1 - share) + SHAKE
-    bounds = np.nan_to_num(bounds.ravel(), nan=np.inf)
-    start = int(np.argmin(bounds))
-    if bounds[start] > within:
-        return np.nan, np.nan
-    outside = np.flatnonzero(bounds > within)
-    low = max(outside[outside < start], default=-1) + 1
-    high = min(outside[outside > start], default=len(bounds)) - 1
-    size = (sizes[:-1, np.newaxis] + share * widths).ravel()
-    return float(size[low]), float(size[high])
+def runnable(
+    make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool
+) -> tuple[Scene | None, str, tuple[str, ...]]:
+    """Scene of the best definition that an engine runs, or None and why there is none; and what was tried."""
+    body, mesh, material, load, *_ = make.args
+    about: dict[str, Any] = {"load": load} if isinstance(body, Shape) else {"loads": loads}
+    tried, refused = trial(body, mesh, material, **about), dict[str, str]()
+    while True:
+        able = [one for one in tried.choices(refused) if one.worst < np.inf and not (springs_alone and one.energies)]
+        if not able:
+            why = next(reversed(refused.values()), "no definition has a stable network on this mesh; take another mesh")
+            return None, why, tried.tried
+        name = able[0].definition
+        scene = make(definition=name)
+        try:
+            if abs(aside := drift(scene, scene.solve().displacements)) > DRIFT:
+                raise EngineError(
+                    f"definition '{name}' moves across by {error_text(aside)}; take a finer mesh, or another type such "
+                    "as 'structured'"
+                )
+            engine.start(net_of(scene), setting, 1.0)
+            return scene, "", tried.tried
+        except EngineError as error:
+            refused[name] = str(error)
