@@ -49,7 +49,6 @@ _NAMES = {
     "problem.status": ("Status",),
     "scene.best_springs": ("BestSprings", "best_springs"),
     "scene.curve": ("Curve", "sensitivity"),
-    "scene.damping": ("Damping", "damping_of"),
     "scene.identify": ("Identified", "identify"),
     "scene.measured": ("MeasuredTest",),
     "scene.meshes": ("make_mesh", "read_mesh"),

@@ -44,8 +44,6 @@ from .scene.best_springs import BestSprings as BestSprings
 from .scene.best_springs import best_springs as best_springs
 from .scene.curve import Curve as Curve
 from .scene.curve import sensitivity as sensitivity
-from .scene.damping import Damping as Damping
-from .scene.damping import damping_of as damping_of
 from .scene.identify import Identified as Identified
 from .scene.identify import identify as identify
 from .scene.measured import MeasuredTest as MeasuredTest

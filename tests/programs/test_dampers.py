@@ -33,6 +33,18 @@ def started(one, name, setting):
     return st.ENGINES[name].start(st.SpringNet.from_scene(one, errors=False), setting, 0.0)
 
 
+def dampers(one, decrement, step=0.0):
+    """Alpha [1/s] or beta [s], each alone, beside what steps of implicit Euler damp."""
+    ratio, frequency = decrement / np.hypot(2 * np.pi, decrement), one.motion().loaded_frequency
+    share = 1 - step * frequency / (2 * ratio)
+    return 2 * share * ratio * frequency, 2 * share * ratio / frequency
+
+
+def stiffness(one):
+    """Of its springs [N/m]."""
+    return st.SpringNet.from_scene(one, errors=False).stiffness
+
+
 NEWTON = {
     "newton-xpbd": (0.1, st.Setting(1e-3, 5, 20), 0.01),
     "newton-vbd": (0.3, st.Setting(1e-3, 5, 60), 0.01),
@@ -52,9 +64,9 @@ def test_springs_of_newton(name):
     pytest.importorskip("newton")
     decrement, setting, tolerance = NEWTON[name]
     one = scene()
-    typed = st.ENGINES[name].typed_dampers(st.damping_of(one, decrement=decrement), setting)
+    _, beta = dampers(one, decrement, setting.step)
     session = started(one, name, setting)
-    session.model.spring_damping.assign(typed["kd"].astype(np.float32))
+    session.model.spring_damping.assign((beta * stiffness(one)).astype(np.float32))
     assert swing(one, session, setting, 1.5).decrement == pytest.approx(decrement, rel=tolerance)
 
 
@@ -64,9 +76,9 @@ def test_triangles_of_newton_vbd():
     pytest.importorskip("newton")
     one, setting = scene("delingette"), st.Setting(1e-3, 5, 60)
     session = started(one, "newton-vbd", setting)
-    typed = st.ENGINES["newton-vbd"].typed_dampers(st.damping_of(one, decrement=0.3), setting)["tri_kd"]
+    _, beta = dampers(one, 0.3, setting.step)
     materials = session.model.tri_materials.numpy()
-    materials[:, 2] = typed * 1.3 / 1.09
+    materials[:, 2] = beta * materials[:, 0] / 2 * 1.3 / 1.09
     session.model.tri_materials.assign(materials)
     assert swing(one, session, setting, 1.5).decrement == pytest.approx(0.3, rel=0.02)
 
@@ -92,18 +104,17 @@ def test_mujoco(name, damper, tmp_path):
     mujoco = pytest.importorskip("mujoco")
     one = scene("delingette" if damper == "flex damping" else "patch", "0.1 mN")
     decrement, setting = (0.3, st.Setting(1e-3, 20)) if "joint" in damper or "discrete" in name else (0.03, SHORT)
-    measured = st.damping_of(one, decrement=decrement)
-    typed = st.ENGINES[name].typed_dampers(measured, setting)[damper]
+    alpha, beta = dampers(one, decrement, setting.step if "discrete" in name else 0.0)
     session = started(one, name, setting)
     if damper == "joint damping":
-        session.model.dof_damping[:] = np.repeat(typed[:, None], 2, axis=1)[~one.held]
+        session.model.dof_damping[:] = np.repeat(alpha * one.statement.masses()[:, None], 2, axis=1)[~one.held]
     if damper == "tendon damping":
-        session.model.tendon_damping[: len(typed)] = typed
+        session.model.tendon_damping[: len(stiffness(one))] = beta * stiffness(one)
     if damper == "flex damping":  # it is compiled into a model
         [path] = one.springs.write(tmp_path / "net.xml", errors=False)
         text = re.sub(' damping="[^"]*"', "", path.read_text())
         options = session.model.opt
-        session.model = mujoco.MjModel.from_xml_string(text.replace("<elasticity ", f'<elasticity damping="{typed}" '))
+        session.model = mujoco.MjModel.from_xml_string(text.replace("<elasticity ", f'<elasticity damping="{beta}" '))
         session.model.opt.timestep, session.model.opt.integrator = options.timestep, options.integrator
         session.data = mujoco.MjData(session.model)
     assert swing(one, session, setting, 1.5).decrement == pytest.approx(decrement, rel=3e-3)
@@ -113,8 +124,7 @@ def test_tendons_of_implicitfast_slow_a_beam():
     """Why no damper over springs is typed there: a damped tendon between two bodies acts as mass, too."""
     pytest.importorskip("mujoco")
     one, setting = scene(force="0.1 mN"), st.Setting(1e-3, 20)
-    damping = st.damping_of(one, decrement=0.03)
-    assert list(st.ENGINES["mujoco-implicitfast"].typed_dampers(damping, setting)) == ["joint damping"]
+    _, beta = dampers(one, 0.03)
     session = started(one, "mujoco-implicitfast", setting)
-    session.model.tendon_damping[: len(damping.dashpots)] = damping.dashpots
-    assert swing(one, session, setting, 1.5).period > 1.1 * damping.period
+    session.model.tendon_damping[: len(stiffness(one))] = beta * stiffness(one)
+    assert swing(one, session, setting, 1.5).period > 1.1 * 2 * np.pi / one.motion().loaded_frequency

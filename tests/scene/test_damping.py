@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -51,6 +52,18 @@ def swing(one, integrator, step, periods=3, **options):
     return st.fit_decay(*np.array(seen).T)
 
 
+def damped(one, decrement=DECREMENT, step=0.0):
+    """Dampers that each alone give the loaded mode a decrement, beside what steps of implicit Euler damp."""
+    ratio, frequency = decrement / np.hypot(2 * np.pi, decrement), one.motion().loaded_frequency
+    share = 1 - step * frequency / (2 * ratio)
+    alpha, beta = 2 * share * ratio * frequency, 2 * share * ratio / frequency
+    stiffness = one.network.stiffness
+    over = {"mass": {"mass_damping": alpha}, "springs": {"dampers": beta * stiffness}}
+    over["both"] = {"mass_damping": alpha / 2, "dampers": beta * stiffness / 2}
+    period = 2 * np.pi / (frequency * np.sqrt(1 - ratio**2))
+    return SimpleNamespace(ratio=ratio, alpha=alpha, beta=beta, over=over, period=period)
+
+
 # -- our integrators ---------------------------------------------------------------------------------------------------
 
 
@@ -61,41 +74,11 @@ def test_a_released_beam_decays_as_was_measured(definition, load, over):
     by x^2 / 12, and decrements that are smaller by x^2 / 6.
     """
     one = scene(definition, load)
-    damping = st.damping_of(one, decrement=DECREMENT)
-    found = swing(one, "implicit-midpoint", damping.period / 100, **damping.options(over))
+    damping = damped(one)
+    found = swing(one, "implicit-midpoint", damping.period / 100, **damping.over[over])
     square = (2 * np.pi / 100) ** 2
     assert found.period == pytest.approx(damping.period * (1 + square / 12), rel=2e-5)
     assert found.decrement == pytest.approx(DECREMENT * (1 - square / 6), rel=2e-5)
-
-
-def pushing(mesh, material, thickness):
-    """Springs of `lattice`, a few of which push a little."""
-    springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
-    relative = springs.relative.copy()
-    relative[::9] = -0.02
-    return st.Springs(springs.reference, relative)
-
-
-@pytest.mark.parametrize("definition", ["delingette", pushing])
-def test_dashpots_where_stiffness_has_no_proportional_ones(definition):
-    """Of energies alone, or of springs that push: dashpots are scaled for the mode, and couple it to others a little.
-
-    The decrement of the loaded mode is then off by terms of the ratio.
-    """
-    one = scene(definition)
-    assert one.springs.relative.min() <= 0
-    damping = st.damping_of(one, decrement=DECREMENT)
-    assert damping.dashpots.min() >= 0
-    found = swing(one, "implicit-midpoint", damping.period / 100, **damping.options("springs"))
-    assert found.decrement == pytest.approx(DECREMENT, rel=damping.ratio)
-
-
-def test_dashpots_are_beta_times_stiffness():
-    damping = st.damping_of(scene(), ratio=0.05)
-    stiffness = st.SpringNet.from_scene(scene(), errors=False).stiffness
-    assert damping.dashpots == pytest.approx(damping.stiffness_damping * stiffness, rel=1e-9)
-    assert damping.mass_damping == pytest.approx(2 * 0.05 * damping.frequency)
-    assert damping.stiffness_damping == pytest.approx(2 * 0.05 / damping.frequency)
 
 
 @pytest.mark.parametrize("mesh_type", ["right", "structured", "free"])
@@ -130,92 +113,12 @@ def test_implicit_euler_damps_as_a_stiffness_damping_of_its_step(count):
 def test_what_implicit_euler_damps_is_taken_off(over):
     """What is left to type gives the decrement that was measured, but for terms of the ratio times omega h."""
     one = scene(size="10 mm")
-    measured = st.damping_of(one, decrement=DECREMENT)
-    step = measured.stiffness_damping / 3
-    left = measured.implicit_euler(step)
-    assert left.stiffness_damping == pytest.approx(measured.stiffness_damping - step)
-    found = swing(one, "backward-euler", step, 1.5, **left.options(over))
+    measured = damped(one)
+    step = measured.beta / 3
+    found = swing(one, "backward-euler", step, 1.5, **damped(one, step=step).over[over])
     x = one.motion().loaded_frequency * step
     assert found.decrement == pytest.approx(DECREMENT, rel=measured.ratio * x + x**2)
-    assert swing(one, "backward-euler", step, 1.5, **measured.options(over)).decrement > 1.3 * DECREMENT
-
-
-def test_a_step_that_damps_more_than_was_measured_is_refused():
-    damping = st.damping_of(scene(), decrement=DECREMENT)
-    with pytest.raises(ValueError, match=r"step: implicit Euler alone has a ratio .* take 7 substeps or more"):
-        damping.implicit_euler("16.6667 ms")
-    assert damping.implicit_euler(1 / 60 / 7).ratio > 0
-    assert damping.implicit_euler(1 / 60 / 7).options("both")["mass_damping"] > 0
-
-
-def test_a_measured_period_corrects_the_stiffness():
-    """With the material that the factor gives, the scene has the measured period, by a run."""
-    first = st.damping_of(scene(), decrement=DECREMENT, period="0.2 s")
-    assert "times the frequency of the loaded mode; multiply stiffnesses by 0.70" in first.notes[0]
-    assert first.notes[0] in str(first)
-    material = st.Material(1e6 * first.stiffness_factor, 0.45, density="1100 kg/m^3")
-    one = st.Scene(BEAM, scene().mesh, material, "bending", "0.1 mN", definition="patch", kinematics="linear")
-    second = st.damping_of(one, decrement=DECREMENT, period="0.2 s")
-    assert second.notes == () and second.stiffness_factor == pytest.approx(1)
-    found = swing(one, "implicit-midpoint", 2e-3, **second.options("springs"))
-    assert (found.period, found.decrement) == pytest.approx((0.2, DECREMENT), rel=1e-3)
-
-
-def test_a_loss_factor_is_twice_the_ratio():
-    one = scene()
-    hertz = one.motion().loaded_frequency / (2 * np.pi)
-    damping = st.damping_of(one, loss_factor=0.1, at=hertz)
-    assert damping.ratio == pytest.approx(0.05) and damping.notes == ()
-    assert st.damping_of(one, loss_factor=0.1).ratio == pytest.approx(0.05)
-    assert "give the loss factor at 5.9" in st.damping_of(one, loss_factor=0.1, at="50 Hz").notes[0]
-
-
-def test_a_load_that_turns_has_a_mode_too():
-    """A follower load cannot be moved under, but let go of."""
-    one = scene(load="follower-pressure", kinematics="nonlinear", force="1 mN")
-    damping = st.damping_of(one, ratio=0.05)
-    assert damping.frequency > 0
-    assert one.motion(released=True, **damping.options("mass")).mass_damping == damping.mass_damping
-
-
-@pytest.mark.parametrize(
-    "given, says",
-    [
-        ({}, "decrement, ratio, loss_factor: 0 are given; give one of them"),
-        ({"ratio": 0.1, "decrement": 0.3}, "2 are given; give one of them"),
-        ({"ratio": 1.0}, "ratio: 1.0 does not mean a damping ratio above 0 and below 1"),
-        ({"decrement": -0.1}, "decrement: -0.1 does not mean a damping ratio above 0"),
-        ({"decrement": "0.3"}, "decrement: '0.3' does not mean a damping ratio above 0"),
-        ({"loss_factor": 2.5}, "loss_factor: 2.5 does not mean a damping ratio above 0 and below 1"),
-        ({"ratio": (0.1, 0.2)}, "does not mean a damping ratio above 0 and below 1; give a number"),
-        ({"ratio": 0.1, "at": "5 Hz"}, "ratio: 0.1 does not go with period=None, at='5 Hz'; leave that out"),
-        ({"loss_factor": 0.1, "period": 1}, "loss_factor: 0.1 does not go with period=1, at=None; leave that out"),
-        ({"loss_factor": 0.1, "at": "5 rad/s"}, "at: '5 rad/s' is .*; give a frequency such as '10 Hz'"),
-        ({"decrement": 0.3, "period": "5 mm"}, "period: '5 mm' is a length; give a time"),
-    ],
-)
-def test_measures_that_say_nothing_are_refused(given, says):
-    with pytest.raises(ValueError, match=says):
-        st.damping_of(scene(), **given)
-
-
-def falling_apart(mesh, material, thickness):
-    """Springs that push so much that the beam is unstable without any load."""
-    springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
-    return st.Springs(springs.reference, np.where(np.arange(len(mesh.edges)) % 3, springs.relative, -1.0))
-
-
-def test_what_is_unstable_at_rest_does_not_swing():
-    with pytest.raises(ValueError, match="definition 'falling_apart': is unstable at rest"):
-        st.damping_of(scene(falling_apart), ratio=0.1)
-
-
-def test_unknown_choices_and_bodies_without_masses_are_refused():
-    with pytest.raises(ValueError, match="over: 'time' is unknown; known: mass, springs, both"):
-        st.damping_of(scene(), ratio=0.1).options("time")
-    light = st.Scene(BEAM, scene().mesh, st.Material("1 MPa", 0.45), "bending", "1 mN")
-    with pytest.raises(ValueError, match="density: material .* has none"):
-        st.damping_of(light, ratio=0.1)
+    assert swing(one, "backward-euler", step, 1.5, **measured.over[over]).decrement > 1.3 * DECREMENT
 
 
 # -- engines -----------------------------------------------------------------------------------------------------------
@@ -241,11 +144,12 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
     """Joints take alpha m, tendons beta k, both in N s/m; Euler's scheme does not damp by itself."""
     monkeypatch.chdir(tmp_path)
     one = scene(size="10 mm", kinematics="nonlinear")
-    damping = st.damping_of(one, decrement=0.03 if tendons else DECREMENT)
-    masses = one.statement.masses()
-    model = with_dampers(one, damping.dashpots if tendons else (damping.mass_damping * masses).tolist(), tendons)
+    decrement = 0.03 if tendons else DECREMENT
+    damping = damped(one, decrement)
+    dashpots = damping.beta * st.SpringNet.from_scene(one, errors=False).stiffness
+    model = with_dampers(one, dashpots if tendons else (damping.alpha * one.statement.masses()).tolist(), tendons)
     free, data, seen = ~one.held, mujoco.MjData(model), []
-    model.opt.timestep = 0.5 * one.motion(**damping.options("springs" if tendons else "mass")).step_limit(
+    model.opt.timestep = 0.5 * one.motion(**damping.over["springs" if tendons else "mass"]).step_limit(
         "symplectic-euler"
     )
     data.qpos[:] = bent(one)[free]
@@ -256,47 +160,23 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
         mujoco.mj_step(model, data, 20)
     found = st.fit_decay(*np.array(seen).T)
     assert found.period == pytest.approx(damping.period, rel=1e-3)
-    assert found.decrement == pytest.approx(damping.decrement, rel=2e-3)
+    assert found.decrement == pytest.approx(decrement, rel=2e-3)
 
 
 @pytest.mark.parametrize("name", ["xpbd", "projective", "vbd", "vbd-inertia", "implicit-cg"])
 def test_an_implicit_engine_is_given_what_its_steps_lack(name):
     """Iterated to the end it is implicit Euler: it swings with the measured decay about its loaded place."""
     one = scene(size="10 mm", kinematics="nonlinear")
-    damping = st.damping_of(one, decrement=DECREMENT)
+    damping = damped(one)
     setting = st.Setting(damping.period / 250, iterations=40)
-    engine = st.ENGINES[name]
-    typed = engine.typed_dampers(damping, setting)["damping"]
-    session, place, seen = engine.start(st.SpringNet.from_scene(one, errors=False), setting, typed), bent(one), []
+    net, typed = st.SpringNet.from_scene(one, errors=False), damped(one, step=setting.step).alpha
+    session, place, seen = st.ENGINES[name].start(net, setting, typed), bent(one), []
     for number in range(300):
         seen.append((number * setting.step, share(one, session.displacements() - place)))
         session.advance(1)
     found = st.fit_decay(*np.array(seen).T)
     assert found.period == pytest.approx(damping.period, rel=1e-3)
     assert found.decrement == pytest.approx(DECREMENT, rel=2e-3)
-    with pytest.raises(ValueError, match="take 9 substeps or more"):
-        engine.typed_dampers(damping, st.Setting("1/60"))
-
-
-@pytest.mark.parametrize(
-    ("engine", "of_springs", "of_triangles"),
-    [
-        ("newton-vbd", {"kd"}, {"tri_kd"}),
-        ("mujoco-discrete", {"joint damping", "tendon damping"}, {"flex damping"}),
-        ("mujoco-euler", {"joint damping", "tendon damping"}, {"flex damping"}),
-        ("xpbd", {"damping"}, {"damping"}),
-    ],
-)
-def test_dampers_are_those_of_springs_or_of_triangles(engine, of_springs, of_triangles):
-    for definition, names in (("patch", of_springs), ("delingette", of_triangles)):
-        one = scene(size="10 mm", definition=definition)
-        damping = st.damping_of(one, decrement=DECREMENT)
-        typed = st.ENGINES[engine].typed_dampers(damping, st.Setting(1e-4))
-        assert set(typed) == names
-    if "tri_kd" in typed:
-        left, net = damping.implicit_euler(1e-4), st.SpringNet.from_scene(one, errors=False)
-        shear = st.ENGINES[engine].typed(net)["tri_ke"]
-        assert typed["tri_kd"] == pytest.approx(left.stiffness_damping * shear / 2)
 
 
 # -- fits --------------------------------------------------------------------------------------------------------------

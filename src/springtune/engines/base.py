@@ -16,7 +16,6 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.newton import membrane
 from ..handover.simulation import WORDS
 from ..handover.terms import Net
 from ..mechanics.energies import Energy
@@ -24,7 +23,6 @@ from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
 from ..registry import Declared, Registry, how_to_install
 from ..safe_io.tables import number_text
-from ..scene.damping import Damping
 
 MOST_COUNTED, LONG_FRAME = 100_000, 1.0
 """Most substeps and iterations, and the longest frame [s]."""
@@ -155,28 +153,6 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 """Stiffness of a spring."""
 
 
-def _of_triangles(damping: Damping) -> float:
-    shear, _ = membrane(SpringNet.from_scene(damping.scene, errors=False))
-    return float(damping.stiffness_damping * shear / 2)
-
-
-DAMPERS: dict[str, Callable[[Damping], Any]] = {
-    "alpha": lambda damping: damping.mass_damping,
-    "alpha m, one for each particle": lambda damping: damping.particle_dampers,
-    "beta k, one for each spring": lambda damping: damping.dashpots,
-    "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
-    "beta of triangles": lambda damping: damping.stiffness_damping,
-    "beta tri_ke / 2 of triangles": _of_triangles,
-}
-"""Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
-
-DASHPOT = Parameter("N s/m", "beta k, one for each spring")
-"""Damper of a spring."""
-
-MASS_DAMPING = {"damping": Parameter("1/s", "alpha")}
-"""Damping over mass by `springtune.in_engine`."""
-
-
 def typed_springs(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each spring [N/m] and moduli of energies, as they are."""
     values = {f"{one.kind} {name}": value for one in net.energies for name, value in one.values.items()}
@@ -211,11 +187,6 @@ class Engine(Declared):
         Numbers that are typed into it.
     iterates : bool
         Whether iterations mean something to it.
-    dampers : dict of str to Parameter
-        Dampers that are typed into it; their formulas are keys of `DAMPERS`. Damping over mass by
-        `springtune.in_engine` is the default.
-    implicit : bool
-        Whether its steps, iterated to the end, are of implicit Euler, which damps by itself.
     typed : callable
         (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all. `numbers`
         calls it.
@@ -260,8 +231,6 @@ class Engine(Declared):
     precisions: tuple[str, ...] = PRECISIONS
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
     iterates: bool = True
-    dampers: Mapping[str, Parameter] = field(default_factory=lambda: MASS_DAMPING)
-    implicit: bool = False
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False
     law: Callable[[Net, float], list[Energy]] | None = None
@@ -335,40 +304,6 @@ class Engine(Declared):
         0.354
         """
         return self.typed(net, setting) if self.of_setting else self.typed(net)
-
-    def typed_dampers(self, damping: Damping, setting: Setting) -> dict[str, Any]:
-        """Dampers to type for a measured decay, each alone; what the steps damp by themselves is taken off.
-
-        Parameters
-        ----------
-        damping : Damping
-            Of a scene, see `springtune.damping_of`.
-        setting : Setting
-
-        Returns
-        -------
-        dict of str to float or ndarray
-            In the units of `dampers`; those of springs where the scene has springs alone, else those of triangles.
-
-        Raises
-        ------
-        ValueError
-            If the steps of the setting alone damp more than was measured.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, rubber = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), rubber, "bending", "1 mN")
-        >>> damping = st.damping_of(scene, decrement=0.3)
-        >>> typed = st.ENGINES["xpbd"].typed_dampers(damping, st.Setting("1/60", substeps=20))
-        >>> round(float(typed["damping"]), 3)
-        2.402
-        """
-        left = damping.implicit_euler(setting.step) if self.implicit else damping
-        unfit = "one for" if damping.scene.springs.energies else "of triangles"
-        typed = {name: one.formula for name, one in self.dampers.items() if unfit not in one.formula}
-        return {name: DAMPERS[formula](left) for name, formula in typed.items()}
 
     def start(self, net: SpringNet, setting: Setting, damping: float) -> Session:
         """Start a session.

@@ -29,7 +29,6 @@ TOLERANCE = 1e-5
     order=50,
     laws=tuple(FORMULAS),
     parameters=as_they_are(*FORMULAS),
-    implicit=True,
     measured="1e-6, twenty scenes",
     source="Baraff 1998",
 )

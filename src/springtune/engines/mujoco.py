@@ -20,7 +20,7 @@ import numpy as np
 from ..handover.mujoco import elasticity, model
 from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
-from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine, release
+from .base import SPRING, EngineError, Parameter, Session, Setting, engine, release
 
 FLEX_SINCE = 4
 """Version of MuJoCo from which on a flex has the law of plane stress."""
@@ -32,11 +32,6 @@ TYPED = {
     "thickness": Parameter("m", "h"),
 }
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
-
-JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}  # MuJoCo 4 refuses it on a flex
-STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta of triangles")}
-"""Dampers over stiffness. `implicitfast` leaves out what a tendon between two bodies does to the other one, so that it
-slows them as a mass does: there, joints alone damp as they should."""
 
 
 def typed(net: SpringNet) -> dict[str, Any]:
@@ -115,9 +110,9 @@ def _declare(order: float, integrator: str, summary: str, **declared: Any) -> No
     )(session)
 
 
-_declare(110, "Euler", "springs explicit", dampers=JOINTS | STIFF)
-_declare(111, "implicitfast", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
-_declare(113, "RK4", "springs explicit, of fourth order", dampers=JOINTS | STIFF)
+_declare(110, "Euler", "springs explicit")
+_declare(111, "implicitfast", "springs explicit, dampers implicit", laws=())
+_declare(113, "RK4", "springs explicit, of fourth order")
 _declare(
     114,
     "discrete",
@@ -125,6 +120,4 @@ _declare(
     needs=("mujoco>=3.13",),
     measured="1e-3, ten scenes",
     iterates=True,
-    dampers=JOINTS | STIFF,
-    implicit=True,
 )

@@ -34,7 +34,7 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.newton import colours, membrane, membrane_energies
-from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
+from .base import SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
@@ -146,7 +146,6 @@ NEWTON_COMMON: dict[str, Any] = {
     "needs": ("newton", "warp"),
     "extra": "newton",
     "precisions": ("float32",),
-    "implicit": True,
     "typed": typed,
     "source": "Newton 1.8, newton.solvers",
 }
@@ -158,7 +157,6 @@ NEWTON_COMMON: dict[str, Any] = {
     laws=("biquadratic",),
     law=membrane_energies,
     parameters={"ke": SPRING} | TRIANGLES,
-    dampers={"kd": DASHPOT, "tri_kd": Parameter("N s/m", "beta tri_ke / 2 of triangles")},
     besides="builder.color() before finalize(), of springs builder.set_coloring(groups that no spring joins); "
     + BESIDES,
     measured="1e-3, ten scenes, by the law that it has",
@@ -173,7 +171,6 @@ def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     "newton-xpbd",
     order=151,
     parameters={"ke": SPRING},
-    dampers={"kd": DASHPOT},
     besides=BESIDES,
     measured="1e-3, nine of ten scenes; 8e-3 near buckling, by rounding: the same steps in double are 5e-4 off",
     **NEWTON_COMMON,

@@ -39,7 +39,6 @@ def shares(net: SpringNet, setting: Setting) -> np.ndarray:
     "pbd",
     order=10,
     parameters={"stiffness": Parameter("1", "1 - (1 + k w h^2)^(-1/n), w = 1/m_i + 1/m_j; h the step, n iterations")},
-    implicit=True,
     typed=lambda net, setting: {"stiffness": shares(net, setting)},
     of_setting=True,
     measured="falls as the step squared; iterations alone end elsewhere",

@@ -31,7 +31,7 @@ def _descent(x, y, inertia, free, springs, lengths, stiffness, descent):  # type
         stretch_spring(descent, free, i, j, dx, dy, stiffness[e] * (lengths[e] - length))
 
 
-@engine("projective", order=30, implicit=True, measured="1e-6, twenty scenes", source="Liu 2013")
+@engine("projective", order=30, measured="1e-6, twenty scenes", source="Liu 2013")
 class Projective(Textbook):
     """Projective dynamics: local directions of springs, and a global linear system that is factorized once."""
 

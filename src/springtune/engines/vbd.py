@@ -150,7 +150,6 @@ VERTEX_LAWS = ("area", "biquadratic")
 IN_COMMON: dict[str, Any] = {
     "laws": VERTEX_LAWS,
     "parameters": as_they_are(*VERTEX_LAWS),
-    "implicit": True,
     "measured": "1e-6, twenty scenes",
     "source": "Chen 2024",
 }

@@ -90,8 +90,6 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     >>> decay = st.fit_decay(times, moved)
     >>> print(f"{decay.period:.4f} s +- {decay.period_error:.4f}; {decay.decrement:.3f} +- {decay.decrement_error:.3f}")
     0.2096 s +- 0.0002; 0.319 +- 0.005
-
-    Its decrement and period are what `damping_of` takes.
     """
     from scipy.optimize import least_squares
 
