@@ -17,4 +17,4 @@ if __name__ == "__main__":
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder).values():
             attempts.do(job.stage.module, job.content)
-        collect.run(load_study(study), study, folder, output)
+        collect.run(load_study(study), folder, output)

@@ -101,7 +101,7 @@ def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
     try:
         store.add(file, {file.stem: {"message": lost, "seconds": 0.1}})
         path = run.folder / "beyond.yaml"
-        collect.run(load_study(path), path, run.folder / "results/beyond", tmp_path / "dataset.nc")
+        collect.run(load_study(path), run.folder / "results/beyond", tmp_path / "dataset.nc")
     finally:
         file.write_bytes(kept)
     text = (tmp_path / "summary.txt").read_text()

@@ -77,7 +77,6 @@ def loaded_study():
             warnings.simplefilter("once", AssumptionWarning)
             warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
             found = load_study(CONFIG)
-        locks.check_paths(CONFIG, Path.cwd())
         locks.check_claim(Path("results") / found.name, CONFIG)
         return found
     except (StudyError, locks.LockedError) as error:

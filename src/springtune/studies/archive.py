@@ -85,7 +85,7 @@ def _inputs(study: Study) -> Mapping[str, Path]:
     """The study and the files that it names, by their names from its folder."""
     beside = study.path.resolve().parent
     found = {}
-    for path in sorted(file.resolve() for file in input_files(study)):
+    for path in (file.resolve() for file in input_files(study)):
         if not path.is_relative_to(beside):
             raise ValueError(f"{study.path}: names {path.name} outside of its folder; move it there, for an archive")
         found[path.relative_to(beside).as_posix()] = path

@@ -51,7 +51,7 @@ def test_the_how_to_is_a_study(here):
             files["uniaxial"], equibiaxial=files["equibiaxial"], pure_shear=files["pure-shear"], name="treloar"
         )
     }
-    assert {f"treloar/{name}.csv" for name in files} <= set(inputs(found, here))
+    assert {f"treloar/{name}.csv" for name in files} <= set(inputs(found))
 
 
 def test_a_test_is_part_of_the_keys_of_what_is_stored(here):

@@ -37,7 +37,7 @@ COOK = STUDIES["shapes"]
 def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     do_stages(study, folder)
-    collect.run(study, study.path, folder, folder / "dataset.nc")
+    collect.run(study, folder, folder / "dataset.nc")
     with xr.open_datatree(folder / "dataset.nc", engine="h5netcdf") as tree:
         tree.load()
     return tree, (folder / "summary.txt").read_text()

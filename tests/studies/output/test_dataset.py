@@ -180,7 +180,7 @@ class TestConventions:
         numbers = {"mesh_size", "stiffness_ratio", "face_position", "poisson_ratio", "friction", "strain"}
         axes = {one: (1.0, 2.0) if one in numbers else ("one", "two") for one in dimensions}
         study = load_study(small(tmp_path))
-        attributes = provenance.attributes(study, study.path)
+        attributes = provenance.attributes(study)
         dataset.write(tmp_path / "dataset.nc", {"/": group.empty(axes)}, attributes)
         assert complaints(tmp_path / "dataset.nc") == []
 
@@ -207,7 +207,7 @@ def committed(folder, message="a"):
 
 def library(folder):
     """Files of a library in a folder; its package."""
-    for name in ("Snakefile", "workflow/rules/common.smk", "requirements/run.txt", "src/springtune/one.py"):
+    for name in ("Snakefile", "workflow/rules/common.smk", "src/springtune/one.py"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("")
     return folder / "src/springtune"
@@ -215,42 +215,22 @@ def library(folder):
 
 class TestProvenance:
     def test_inputs_are_named_without_the_machine(self, tmp_path):
-        repository = tmp_path / "somewhere"
-        (repository / "config").mkdir(parents=True)
-        (repository / "requirements").mkdir()
-        (repository / "requirements/run.txt").write_text("numpy==2\n")
-        path = small(repository / "config")
-        found = provenance.attributes(load_study(path), path)
+        path = small(tmp_path)
+        found = provenance.attributes(load_study(path))
         inputs = json.loads(found["inputs"])
-        assert set(inputs) == {"config/small.yaml", "requirements/run.txt"}
-        assert inputs["config/small.yaml"] == found["config_sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+        assert inputs == {"small.yaml": hashlib.sha256(path.read_bytes()).hexdigest()}
+        assert inputs["small.yaml"] == found["config_sha256"]
         assert str(tmp_path) not in json.dumps(found)
         assert "references" not in found  # nothing printed
 
     def test_a_changed_checkout_is_told(self, tmp_path):
         package, path = library(tmp_path), small(tmp_path)
         committed(tmp_path)
-        clean = provenance.attributes(load_study(path), path, package=package)
-        assert len(clean["git_commit"]) == 40 and "study_commit" not in clean
+        clean = provenance.attributes(load_study(path), package)
+        assert len(clean["git_commit"]) == 40
         path.write_text(path.read_text().replace("Small", "Smaller"))
-        dirty = provenance.attributes(load_study(path), path, package=package)
+        dirty = provenance.attributes(load_study(path), package)
         assert dirty["git_commit"] == clean["git_commit"] + "+changes"
-
-    def test_a_study_in_a_checkout_of_its_own_has_two_commits(self, tmp_path):
-        package, mine = library(tmp_path / "library"), tmp_path / "mine"
-        mine.mkdir()
-        path = small(mine)
-        unknown = provenance.attributes(load_study(path), path, package=package)
-        assert unknown["git_commit"] == "" and "study_commit" not in unknown
-        committed(tmp_path / "library")
-        outside = provenance.attributes(load_study(path), path, package=package)
-        assert len(outside["git_commit"]) == 40 and "study_commit" not in outside
-        committed(mine, "another")
-        (package / "one.py").write_text("changed code\n")
-        path.write_text(path.read_text() + "# changed study\n")
-        found = provenance.attributes(load_study(path), path, package=package)
-        assert found["git_commit"] == outside["git_commit"] + "+changes"
-        assert found["study_commit"].endswith("+changes") and found["study_commit"][:40] != outside["git_commit"]
 
     def test_a_built_package_has_the_commit_that_it_was_built_from(self, tmp_path):
         """And not that of a folder above, such as of a project whose environment it is in."""
@@ -259,11 +239,11 @@ class TestProvenance:
         path = small(package / "workflow/config")
         committed(tmp_path)
         assert workflow_folder(package) == package / "workflow" and clone(package) is None
-        unknown = provenance.attributes(load_study(path), path, package=package)
-        assert unknown["git_commit"] == "" and "study_commit" not in unknown
+        unknown = provenance.attributes(load_study(path), package)
+        assert unknown["git_commit"] == ""
         (package / "commit.txt").write_text("f00d\n")
-        known = provenance.attributes(load_study(path), path, package=package)
-        assert known["git_commit"] == "f00d" and "study_commit" not in known
+        known = provenance.attributes(load_study(path), package)
+        assert known["git_commit"] == "f00d"
 
 
 def write_curves(path, value):

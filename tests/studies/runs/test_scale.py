@@ -34,7 +34,7 @@ def test_a_study_has_meshes_of_more_particles_than_a_file_of_others(tmp_path):
     }
     study = load_text(tmp_path, yaml.safe_dump(text))
     do_stages(study, tmp_path / "results")
-    collect.run(study, study.path, tmp_path / "results", tmp_path / "results/dataset.nc")
+    collect.run(study, tmp_path / "results", tmp_path / "results/dataset.nc")
     with xr.open_dataset(tmp_path / "results/dataset.nc") as data:
         assert data.status.item() == 1 and data.particles.item() > 1e6 and abs(data.deformation_error.item()) < 2e-3
 

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 
-def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
+def run(study: "Study", folder: Path, output: Path) -> None:
     """Build the dataset of a study from its stored results."""
     try:
         groups = gathered(study, folder)
-        dataset.write(output, groups, provenance.attributes(study, config))
+        dataset.write(output, groups, provenance.attributes(study))
     except DamagedError as error:
         job.forget_job_of(error.path, folder)
         raise SystemExit(str(error)) from None
@@ -42,7 +42,7 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     study = load_study(config)
     if rerun.jobs(study, Path(folder))[rerun.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    run(study, config, Path(folder), Path(output))
+    run(study, Path(folder), Path(output))
     atomic.write_json(record, {"digest": digest})
 
 

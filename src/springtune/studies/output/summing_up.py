@@ -221,8 +221,6 @@ def _provenance(tree: xr.DataTree) -> list[str]:
     lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
     if attributes.get("git_commit"):
         lines.append(f"  commit {attributes['git_commit']}")
-    if attributes.get("study_commit"):
-        lines.append(f"  study: commit {attributes['study_commit']}")
     software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))

@@ -32,15 +32,6 @@ class LockedError(ValueError):
     """Another process computes a study, or its folder is another study's; the message has the reason and the remedy."""
 
 
-def check_paths(*paths: Path) -> None:
-    """Refuse paths that notes and datasets cannot hold."""
-    for path in paths:
-        try:
-            str(path).encode()
-        except UnicodeEncodeError:
-            raise LockedError(f"{str(path)!r}: not UTF-8, as texts of results are; rename the file or folder") from None
-
-
 def claim(folder: Path, config: Path) -> None:
     """Note the study that a folder belongs to."""
     place, path = (Path(os.path.abspath(one)) for one in (folder.parent.parent, config))

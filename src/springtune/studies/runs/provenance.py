@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import platform
 import subprocess
 from datetime import UTC, datetime
@@ -34,9 +35,6 @@ SOFTWARE = (
     "xarray",
 )
 
-LOCK = Path("requirements/run.txt")
-"""Lock file, beside the study or above it."""
-
 CHANGED = "+changes"
 """Ending of `git_commit` if files differ from the commit."""
 
@@ -44,13 +42,11 @@ PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2
 """Sources of printed values by file name."""
 
 
-def attributes(study: Study, config: str | Path, package: Path = PACKAGE) -> dict[str, str]:
+def attributes(study: Study, package: Path = PACKAGE) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
     software["python"] = platform.python_version()
-    folder = Path(config).resolve().parent
-    library, own = library_commit(package), study_commit(folder, package)
     found = {
         "title": study.title,
         "Conventions": "CF-1.11",
@@ -59,17 +55,16 @@ def attributes(study: Study, config: str | Path, package: Path = PACKAGE) -> dic
         "study": study.name,
         "config": study.text,
         "config_sha256": hashlib.sha256(study.text.encode()).hexdigest(),
-        "inputs": json.dumps(inputs(study, folder), sort_keys=True),
+        "inputs": json.dumps(inputs(study), sort_keys=True),
         "springtune_version": __version__,
-        "git_commit": library,
+        "git_commit": library_commit(package),
         "created": created,
         "software": json.dumps(software, sort_keys=True),
     }
     if study.printed_path:
         name = study.printed_path.name
         found["references"] = f"paper_*: as printed in {PRINTED.get(name, name)}"
-    found |= {"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {}
-    return found | ({"study_commit": own} if own else {})
+    return found | ({"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {})
 
 
 def _plugins(study: Study) -> set[str]:
@@ -79,52 +74,26 @@ def _plugins(study: Study) -> set[str]:
     return {package for table in tables for name, package in table.packages.items() if name in used}
 
 
-def inputs(study: Study, folder: Path) -> dict[str, str]:
-    """SHA-256 of each input file, lock file included."""
-    root = _checkout(folder)
-    files = input_files(study) | ({root / LOCK} if root else set())
-    return {_name(file.resolve(), root or folder): checksum(file) for file in sorted(files)}
+def inputs(study: Study) -> dict[str, str]:
+    """SHA-256 of each input file, by its path from the study's folder."""
+    return {Path(os.path.relpath(file, study.path.parent)).as_posix(): checksum(file) for file in input_files(study)}
 
 
-def _checkout(folder: Path) -> Path | None:
-    """Checkout that contains a folder."""
-    return next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
-
-
-def input_files(study: Study) -> set[Path]:
+def input_files(study: Study) -> list[Path]:
     """The study's file and all files that it names."""
-    return {study.path, *study.files, *(file for kind in kinds() for file in kind.files(study.parts[kind.name]))}
-
-
-def _name(file: Path, root: Path) -> str:
-    """File name without parts that depend on the machine."""
-    return file.relative_to(root).as_posix() if file.is_relative_to(root) else f"{file.parent.name}/{file.name}"
-
-
-def git_commit(folder: Path) -> str:
-    """Commit of the checkout, with `CHANGED` if files differ; empty outside of git."""
-    return git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
+    return sorted({study.path, *study.files, *(file for kind in kinds() for file in kind.files(study.parts[kind.name]))})
 
 
 def library_commit(package: Path = PACKAGE) -> str:
-    """Commit of the library: the noted one of a built package, or that of its clone; empty if unknown."""
+    """Commit of the library, as a built package notes it or of its clone; empty if unknown.
+
+    It ends with `CHANGED` if files of the clone differ.
+    """
     noted, root = package / COMMIT_FILE, clone(package)
-    if noted.is_file():
-        return noted.read_text().strip()
-    return git_commit(root) if root else ""
-
-
-def study_commit(folder: Path, package: Path) -> str:
-    """Commit of the checkout of a study; empty outside of git and for studies of the library."""
-    top, root = git(folder, "rev-parse", "--show-toplevel").removesuffix("\n"), clone(package)
-    of_library = folder.is_relative_to(package.resolve()) or (root and root.resolve() == Path(top))
-    return git_commit(folder) if top and not of_library else ""
-
-
-def git(folder: Path, *arguments: str) -> str:
-    """Output of a git command, empty if it fails; bytes other than UTF-8 are escaped."""
+    if noted.is_file() or root is None:
+        return noted.read_text().strip() if noted.is_file() else ""
+    command = ["git", "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*"]
     try:
-        answer = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, check=True)
+        return subprocess.run(command, cwd=root, capture_output=True, check=True, text=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return ""
-    return answer.stdout.decode(errors="surrogateescape")

@@ -77,7 +77,7 @@ def _collect_digest(study: "Study", jobs: dict[str, Job]) -> str:
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
     results = sorted({result for job in jobs.values() for result in job.results})  # whatever bundles they are in
-    return hash_of(study.name, inputs(study, study.path.resolve().parent), results, code)
+    return hash_of(study.name, inputs(study), results, code)
 
 
 def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
