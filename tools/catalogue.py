@@ -19,7 +19,7 @@ from springtune.handover.simulation import WORDS
 from springtune.handover.terms import terms_of
 from springtune.linalg.factors import SingularError
 from springtune.mesh import lattice
-from springtune.mesh.bonds import bonded
+from springtune.mesh.sheets import bonded
 from springtune.safe_io.atomic import write_text
 from springtune.springs import DEFINITIONS, Definition, Springs
 from springtune.springs.calibrated import calibrate

@@ -217,7 +217,7 @@ def write_med(path):
 
 
 def write_refs(path, key):
-    """Numbers of groups as other formats have them."""
+    """Numbers of groups as `meshio convert` keeps those of other formats."""
     cells = [("line", np.concatenate([RIGHT, LEFT]) - 1), ("quad", QUADS - 1), ("triangle", TRIANGLES - 1)]
     tags = [np.array([101, 101, 102, 102]), np.where(HARD[4], 201, 202), np.where(HARD[3], 201, 202)]
     meshio.Mesh(np.column_stack([POINTS, 0 * POINTS[:, 0]]), cells, cell_data={key: tags}).write(path)
@@ -227,8 +227,7 @@ WRITTEN = {
     "marks.vtu": write_clean,
     "version.vtu": write_newer,
     "plate.med": write_med,
-    "numbers.mesh": lambda path: write_refs(path, "medit:ref"),
-    "numbers.avs": lambda path: write_refs(path, "avsucd:material"),
+    "numbers.vtu": lambda path: write_refs(path, "medit:ref"),
 }
 
 TEXTS = {
@@ -279,19 +278,11 @@ def replaced(write, old, new):
 MSH41, MSH22, PARTITIONED, TWICE22 = msh41(), msh22(), msh22(partition=2), msh22(twice=True)
 
 
-def unnamed_types(path):
-    """A binary file of VTK without the types of its cells."""
-    write_mesh(path.with_suffix(".vtu"), CLEAN)
-    meshio.read(path.with_suffix(".vtu")).write(path)
-    path.write_bytes(path.read_bytes().replace(b"CELL_TYPES", b"NO_TYPES__"))
-
-
 REFUSED = {file: (changed(*row), filled(says)) for file, *row, says in ROWS["refused"]} | {
     "pieces.vtu": (replaced(write_clean, b"<Piece ", b"<Piece /><Piece "), "has 2 pieces, and one is read; join them"),
     "lz4.vtu": (replaced(write_clean, b"ZLib", b"LZ4"), "is compressed by LZ4, which is not read; write it with ZLib"),
     "ghosts.vtu": (one_of_several, OTHER_FILES),
     "parallel.vtu": (replaced(write_clean, b'"Unstr', b'"PUnstr'), OTHER_FILES),
-    "binary.vtk": (unnamed_types, "has what is not supported.*; write it again, in text"),
 }
 
 

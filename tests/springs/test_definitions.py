@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, MeshError, lattice, signed_areas, write_mesh
-from springtune.mesh.bonds import bonded
+from springtune.mesh.sheets import bonded
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import MeshError
-from .content import IN_OTHER_FILES, Block, Content, places
+from .groups import IN_OTHER_FILES, Block, Content, places
 
 KEYWORDS_NOT_READ = {
     r"N(GEN|FILL|COPY|MAP)|EL(GEN|COPY)|SYSTEM|PARAMETER|IMPORT|SYMMETRICMODEL\w*|MODELCHANGE": (

@@ -53,7 +53,7 @@ class Mesh:
     quads : ndarray of int, shape (n_quads, 4), optional
         Corner indices, counter-clockwise.
     bonds : ndarray of int, shape (n_bonds, 2), optional
-        Further pairs of points with a spring, which no cell joins; see `springtune.mesh.bonds`.
+        Further pairs of points with a spring, which no cell joins; see `springtune.mesh.sheets.bonded`.
 
     Raises
     ------

@@ -1,13 +1,12 @@
-"""Mesh files: Gmsh's 4.1 and Abaqus' by readers of their own, all others by meshio.
+"""Mesh files: Gmsh's 4.1 and Abaqus' by readers of their own, Gmsh's 2.2, MED and VTU by meshio.
 
 Groups are Gmsh's physical groups, sets of Abaqus and others, and marks in VTU.
 """
 
 import io
 import re
-import warnings
 from collections import defaultdict
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from contextlib import redirect_stderr
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,11 +15,10 @@ import numpy as np
 
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import check_folder, replacing
-from ..safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
+from ..safe_io.inputs import DataElsewhere, bounded, check_alone, fault
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas
-from .content import IN_OTHER_FILES, LINEAR, Block, Content
-from .groups import GroupedMesh, part_names
+from .groups import IN_OTHER_FILES, LINEAR, Block, Content, GroupedMesh, part_names
 from .sheets import DIGITS, box_fault, in_words, on_sides, outline_of, sheet_fault
 
 CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
@@ -38,20 +36,11 @@ FAMILIES = ("cell_tags", "point_tags")
 COPIED = ("vtkGhostType", "vtkGhostLevels")
 """Data in which what belongs to other files is not 0."""
 
-ENDINGS_NOT_READ = {
-    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), IN_OTHER_FILES),
-    **dict.fromkeys(
-        (".bdf", ".nas", ".fem"), "is of Nastran, which is not read; export it as .msh, .inp, .med or .vtu"
-    ),
-    **dict.fromkeys((".e", ".exo", ".ex2"), "is of Exodus, which is not read; export it as .msh, .inp, .med or .vtu"),
-}
-"""Why files are refused by their ending: meshio would not see parts of them, or their groups."""
+ENDINGS = (".msh", ".inp", ".med", ".vtu")
+"""Endings of the files that are read."""
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
-
-HDF5 = b"\x89HDF\r\n"
-"""What files of HDF5 begin with, some after a block of their own."""
 
 READ_MEMORY, READ_MEMORY_SHARE = 5e8, 40.0
 """Memory that reading a file may take [bytes], and how often its size besides: no sound file takes as much."""
@@ -115,7 +104,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """Read a mesh of any format that meshio supports.
+    """Read a mesh of Gmsh, Abaqus, MED or VTU.
 
     Particles without cells are dropped, clockwise cells are turned.
 
@@ -167,57 +156,43 @@ def _file_content(path: str | Path) -> Content:
     if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     size, ending = Path(path).stat().st_size, Path(path).suffix.lower()
+    if ending not in ENDINGS:
+        remedy = f"convert it, by 'meshio convert {Path(path).name} {Path(path).stem}.vtu', say"
+        raise MeshError(f"{path}: unknown format '{ending}': {', '.join(ENDINGS)} are read; {remedy}")
     if size == 0:
         raise MeshError(f"{path}: the file is empty; write the mesh again")
     if size > LARGEST_FILE:
         most = f"at most {LARGEST_FILE // 1_000_000} MB are read"
         raise MeshError(f"{path}: {size / 1e6:.0f} MB, and {most}; write a coarser mesh, or binary VTU")
-    if ending in ENDINGS_NOT_READ:
-        raise MeshError(f"{path}: {ENDINGS_NOT_READ[ending]}")
-    raw = Path(path).read_bytes()
-    if HDF5 in raw:
-        try:
-            with suppress(OSError):  # meshio says it
-                check_alone(path)
-        except DataElsewhere as error:
-            raise MeshError(str(error)) from None
-    told, memory = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size
+    memory, seconds = READ_MEMORY + READ_MEMORY_SHARE * size, READ_SECONDS + READ_SECONDS_SHARE * size
     try:
-        # meshio tells people of what it leaves out, and exits where it does not know the format.
-        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            with bounded(memory, READ_SECONDS + READ_SECONDS_SHARE * size):
-                return _read(path, raw, ending)
+        # meshio prints what it leaves out, and exits where it reads nothing.
+        with redirect_stderr(io.StringIO()), np.errstate(all="ignore"), bounded(memory, seconds):
+            return _read(path, ending)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    except MemoryError as error:
-        wanted = np.inf if isinstance(error, BeyondBound) else 8 * np.prod(getattr(error, "shape", 0), dtype=float)
-        if wanted <= memory:
-            raise  # the machine has too little
-        stated = f"it states more points or cells than its {size / 1e3:.3g} kB can hold"
-        raise MeshError(f"{path}: is damaged: {stated}; write it again") from None
+    except DataElsewhere as error:  # names the file
+        raise MeshError(str(error)) from None
     except (Exception, SystemExit) as error:
-        if isinstance(error, OSError) and (error.errno or 0) > 0:  # the system's; netCDF has numbers of its own, below
-            raise
-        said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
-        said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
-        said = said if re.search(r"\w{2} \S", said) else ""  # a key alone says nothing
-        shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
+        message = " ".join(str(error).split())[:LONGEST_SAID]
+        shown = f" ({message})" if re.search(r"\w{2} \S", message) else ""  # a key alone tells nothing
         why = f"it is damaged, or has what is not supported{shown}; write it again, in text, or as .vtu"
-        if ending not in library().extension_to_filetypes:
-            why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
         raise MeshError(f"{path}: cannot be read: {why}") from None
 
 
-def _read(path: str | Path, raw: bytes, ending: str) -> Content:
+def _read(path: str | Path, ending: str) -> Content:
     """Content of a file, by the reader of its format."""
+    raw = Path(path).read_bytes()
     if ending == ".inp":
         return abaqus.read(raw)
     if ending == ".vtu":
         return _read_vtu(raw)
-    if ending == ".msh" and raw.lstrip()[:1] == b"$":  # others are of Ansys
-        return gmsh.read(raw) or gmsh.check_once(_by_meshio(library().read(path)))
-    return _by_meshio(library().read(path))
+    if ending == ".med":
+        check_alone(path)
+    elif content := gmsh.read(raw):
+        return content
+    content = _by_meshio(library().read(path))
+    return gmsh.check_once(content) if ending == ".msh" else content
 
 
 def _read_vtu(raw: bytes) -> Content:
@@ -259,14 +234,6 @@ def _by_meshio(found: Any) -> Content:
     starts = content.starts()
     # Names with a colon are notes of a format, as of MED.
     content.cell_groups.update({name: [] for name in found.field_data if ":" not in name})
-    for name, blocks in found.cell_sets.items():
-        if len(blocks) != len(content.cells):
-            content.unusable[name] = "is a set of which meshio does not tell the cells; give it as cells"
-            continue
-        members = ((own, start) for own, start in zip(blocks, starts) if own is not None)
-        content.cell_groups[name] = [np.ravel(own).astype(np.int64) + start for own, start in members]
-    for name, nodes in found.point_sets.items():
-        content.point_groups[name].append(np.ravel(nodes).astype(np.int64))
     dimensions = np.repeat([min(CORNERS[kind] - 1, 2) for kind, _ in content.cells], np.diff(starts))
     names = {tuple(map(int, one)): name for name, one in found.field_data.items() if len(one) == 2}
     for key, arrays in found.cell_data.items():
@@ -351,9 +318,9 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
 
 
 def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
-    """Read a mesh with its groups, of any format that meshio supports.
+    """Read a mesh with its groups, of Gmsh, Abaqus, MED or VTU.
 
-    Groups are physical groups of Gmsh (by number if unnamed), sets of cells and points of Abaqus and others, and
+    Groups are physical groups of Gmsh (by number if unnamed), sets of Abaqus, groups of MED, and
     named arrays of zeros and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline,
     make sides; one point makes a point; triangles and quadrilaterals make a part, unless they are all cells.
 

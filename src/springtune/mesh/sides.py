@@ -1,9 +1,13 @@
 """Sides of an outline, straight or arcs: points, lengths and intersections."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from .sheets import in_words, nearer, winding
 
 Point = tuple[float, float]
 """Coordinates [m]."""
@@ -13,6 +17,9 @@ SAME = 1e-9
 
 APART = 1e-9
 """Smallest distance of sides over the extent of the shape; nearer ones touch."""
+
+CHORD_ERROR = 1e-6
+"""Largest distance of an arc from the polygon that stands for it in checks, over the extent of its round."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +47,7 @@ class OutlineSide:
 
     def __post_init__(self) -> None:
         if self.start == self.end:
-            raise ValueError(f"from {in_mm(self.start)} to itself; leave it out, and split a circle into four arcs")
+            raise ValueError(f"from {in_words(self.start)} to itself; leave it out, and split a circle into four arcs")
         _ = self.arc  # refused here, not when it is used
 
     @cached_property
@@ -51,7 +58,7 @@ class OutlineSide:
         centre = self.centre
         (x, y), (u, v) = ((end[0] - centre[0], end[1] - centre[1]) for end in (self.start, self.end))
         first, second = math.hypot(x, y), math.hypot(u, v)
-        about = f"arc from {in_mm(self.start)} to {in_mm(self.end)} about {in_mm(centre)}"
+        about = f"arc from {in_words(self.start)} to {in_words(self.end)} about {in_words(centre)}"
         if not min(first, second) > SAME * max(first, second):
             raise ValueError(f"{about}: an end is at the centre; move one of them")
         if abs(first - second) <= SAME * first:
@@ -231,111 +238,54 @@ def extent(sides: Sequence[OutlineSide]) -> tuple[Point, Point]:
     return (min(xs), min(ys)), (max(xs), max(ys))
 
 
-def winds_about(sides: Sequence[OutlineSide], point: Point) -> bool:
-    """Whether a round winds about a point that is not on it."""
-    (left, low), (right, high) = extent(sides)
-    if not (left <= point[0] <= right and low <= point[1] <= high):
-        return False
-    total = 0.0
-    for side in sides:
-        stretches = [(0.0, 1.0)]
-        while stretches:
-            low, high = stretches.pop()
-            first, second = side.at(low), side.at(high)
-            if _to_chord(point, first, second) <= side.aside(low, high) and high - low > 1e-12:
-                middle = 0.5 * (low + high)
-                stretches += [(low, middle), (middle, high)]
-                continue
-            (a, b), (c, d) = ((end[0] - point[0], end[1] - point[1]) for end in (first, second))
-            total += math.atan2(a * d - b * c, a * c + b * d)
-    return abs(total) > math.pi
+@lru_cache(maxsize=256)
+def polygon(sides: tuple[OutlineSide, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return points along a round (n, 2) [m], and the number of the side that begins or goes on at each.
+
+    The polygon through them is within `CHORD_ERROR` of the round.
+    """
+    error = CHORD_ERROR * math.dist(*extent(sides))
+    points, numbers = [], []
+    for number, side in enumerate(sides):
+        count = 1
+        if side.arc is not None:
+            count = math.ceil(abs(side.arc[3]) * math.sqrt(max(side.arc[:2]) / (8 * error)))
+        points += [side.at(i / count) for i in range(count)]
+        numbers += [number] * count
+    return np.array(points), np.array(numbers)
 
 
-def meeting(rounds: Sequence[Sequence[OutlineSide]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
+def _closed(count: int, first: int = 0) -> np.ndarray:
+    """Edges (count, 2) of a polygon of so many points, numbered from the first on."""
+    numbers = np.arange(count)
+    return first + np.stack([numbers, np.roll(numbers, -1)], axis=1)
+
+
+def winds_about(sides: tuple[OutlineSide, ...], point: Point) -> bool:
+    """Return whether a round winds about a point that is not on it."""
+    points, _ = polygon(sides)
+    return winding(points, _closed(len(points)), np.array(point)) != 0
+
+
+def meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
     """Return where sides of rounds meet off shared corners, or None: round and side of both, and the point [m]."""
-    (left, low), (right, high) = extent([side for sides in rounds for side in sides])
-    small = APART * max(right - left, high - low)
-    for one, other in _near(rounds, small):
-        first, second = (rounds[which][number] for which, number in (one, other))
-        for span, other_span in _away_from_corners(one[1], other[1], len(rounds[one[0]]) if one[0] == other[0] else 0):
-            where = _meet(first, second, span, other_span, small)
-            if where is not None:
-                return one, other, where
-    return None
-
-
-Span = tuple[float, float]
-"""Parameters between which a stretch of a side is."""
-
-
-def _away_from_corners(i: int, j: int, count: int) -> list[tuple[Span, Span]]:
-    """Stretches of two sides of a round of so many that are not to meet: all of one and of the other but its corner."""
-    whole, without_start, without_end = (0.0, 1.0), (1e-3, 1.0), (0.0, 1 - 1e-3)
-    if count == 2:
-        return [((1e-3, 1 - 1e-3), whole), (whole, (1e-3, 1 - 1e-3))]
-    if count and (i + 1) % count == j:
-        return [(without_end, whole), (whole, without_start)]
-    if count and (j + 1) % count == i:
-        return [(without_start, whole), (whole, without_end)]
-    return [(whole, whole)]
-
-
-def _near(rounds: Sequence[Sequence[OutlineSide]], small: float) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Pairs of sides whose boxes are not apart, each once and in order: number of round and side, of both."""
-    boxes = sorted(
-        (extent([side]), (which, number)) for which, sides in enumerate(rounds) for number, side in enumerate(sides)
-    )
-    active: list[tuple[tuple[Point, Point], tuple[int, int]]] = []
-    for (low, high), name in boxes:
-        active = [one for one in active if one[0][1][0] >= low[0] - small]
-        for (other_low, other_high), other in active:
-            if other_low[1] <= high[1] + small and other_high[1] >= low[1] - small:
-                yield min(name, other), max(name, other)
-        active.append(((low, high), name))
-
-
-def _meet(side: OutlineSide, other: OutlineSide, span: Span, other_span: Span, small: float) -> Point | None:
-    """Where stretches of two sides come nearer than a distance to each other; None where they do not."""
-    pairs = [(span, other_span)]
-    while pairs:
-        one, two = pairs.pop()
-        bounds = side.aside(*one), other.aside(*two)
-        distance, where = _chords_apart(side.at(one[0]), side.at(one[1]), other.at(two[0]), other.at(two[1]))
-        if distance > bounds[0] + bounds[1] + small:
-            continue
-        if max(bounds) <= 0.1 * small:
-            return where
-        if bounds[0] >= bounds[1]:
-            middle = 0.5 * (one[0] + one[1])
-            pairs += [((one[0], middle), two), ((middle, one[1]), two)]
-        else:
-            middle = 0.5 * (two[0] + two[1])
-            pairs += [(one, (two[0], middle)), (one, (middle, two[1]))]
-    return None
-
-
-def _to_chord(point: Point, start: Point, end: Point) -> float:
-    """Distance of a point from a straight stretch [m]."""
-    along = end[0] - start[0], end[1] - start[1]
-    square = along[0] ** 2 + along[1] ** 2
-    share = ((point[0] - start[0]) * along[0] + (point[1] - start[1]) * along[1]) / square if square else 0.0
-    share = min(max(share, 0.0), 1.0)
-    return math.dist((start[0] + share * along[0], start[1] + share * along[1]), point)
-
-
-def _chords_apart(a: Point, b: Point, c: Point, d: Point) -> tuple[float, Point]:
-    """Distance between the straight stretches from a to b and from c to d [m], and where it is."""
-
-    def left(one: Point, two: Point, three: Point) -> float:
-        return (two[0] - one[0]) * (three[1] - one[1]) - (two[1] - one[1]) * (three[0] - one[0])
-
-    on_left, other_on_left = left(c, d, a), left(c, d, b)
-    if left(a, b, c) * left(a, b, d) < 0 and on_left * other_on_left < 0:
-        share = on_left / (on_left - other_on_left)
-        return 0.0, (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
-    return min((_to_chord(a, c, d), a), (_to_chord(b, c, d), b), (_to_chord(c, a, b), c), (_to_chord(d, a, b), d))
-
-
-def in_mm(point: Point, digits: int = 9) -> str:
-    """A point, in words."""
-    return f"({1e3 * point[0]:.{digits}g}, {1e3 * point[1]:.{digits}g}) mm"
+    points, edges, reaches, names = [], [], [], []
+    size = max(math.dist(*extent(sides)) for sides in rounds)
+    for which, sides in enumerate(rounds):
+        corners, numbers = polygon(sides)
+        edges.append(_closed(len(corners), len(names)))
+        points.append(corners)
+        names += [(which, number) for number in numbers.tolist()]
+        errors = [0.0 if side.arc is None else CHORD_ERROR * math.dist(*extent(sides)) for side in sides]
+        reaches.append(APART * size + np.array(errors)[numbers])
+    places, ends = np.concatenate(points), np.concatenate(edges)
+    one, other, _ = nearer(places, ends, np.concatenate(reaches))
+    if not len(one):
+        return None
+    pairs = np.sort(np.stack([one, other], axis=1), axis=1)  # edges are numbered as their sides are
+    one, other = min(pairs.tolist())
+    (start, end), (other_start, other_end) = places[ends[one]], places[ends[other]]
+    ways = np.stack([end - start, other_start - other_end], axis=1)
+    share = np.linalg.lstsq(ways, other_start - start, rcond=None)[0][0]
+    x, y = (start + np.clip(share, 0.0, 1.0) * (end - start)).tolist()
+    return names[one], names[other], (x, y)

@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
+from ..mesh.sheets import in_words
+from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, meeting, turned, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_size, warn_of_thickness
 from .quantities import Number, nearest, positive, put, quantity
@@ -621,17 +622,17 @@ class Shape:
             for before, side in zip((one[-1], *one[:-1]), one):
                 (x, y), (u, v) = before.tangent(1.0), side.tangent(0.0)
                 if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6:
-                    raise ValueError(f"{what}: turns back on itself at {in_mm(side.start)}; move a corner")
+                    raise ValueError(f"{what}: turns back on itself at {in_words(side.start)}; move a corner")
         met = meeting([one for _, one in rounds])
         if met:
             (first, i), (second, j), where = met
             if first == second:
                 both = f"sides {i + 1} and {j + 1} meet"
-                raise ValueError(f"{rounds[first][0]}: {both} at {in_mm(where, 4)}; move a corner")
-            raise ValueError(f"{rounds[second][0]} meets {rounds[first][0]} at {in_mm(where, 4)}; keep them apart")
+                raise ValueError(f"{rounds[first][0]}: {both} at {in_words(where)}; move a corner")
+            raise ValueError(f"{rounds[second][0]} meets {rounds[first][0]} at {in_words(where)}; keep them apart")
         for what, one in rounds[1:]:
             if not winds_about(sides, one[0].start):
-                raise ValueError(f"{what}: is outside the outline, at {in_mm(one[0].start)}; move it")
+                raise ValueError(f"{what}: is outside the outline, at {in_words(one[0].start)}; move it")
         for (other_what, other), hole in zip(rounds[1:], self.holes):
             inside = [what for what, one in rounds[1:] if one is not other and winds_about(other, one[0].start)]
             if inside and not hole.part:
@@ -654,10 +655,12 @@ class Shape:
                     corners = [corner for corner in (side.start, side.end) if math.dist(corner, point) <= near]
                     return corners[0] if corners else side.at(parameter)
         if self.part_at(point) is None:
-            raise ValueError(f"point {name!r}: {in_mm(point)} is not in the body; move it")
+            raise ValueError(f"point {name!r}: {in_words(point)} is not in the body; move it")
         for other, place in self.points.items():
             if 0 < math.dist(point, place) <= near:
-                raise ValueError(f"points {name!r} and {other!r}: are as good as one at {in_mm(point)}; make them one")
+                raise ValueError(
+                    f"points {name!r} and {other!r}: are as good as one at {in_words(point)}; make them one"
+                )
         return point
 
     @cached_property

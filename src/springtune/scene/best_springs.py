@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from ..mesh.bonds import bonded
 from ..mesh.cells import Mesh
+from ..mesh.sheets import bonded
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..mesh.groups import GroupedMesh, part_names
-from ..mesh.sides import OutlineSide, in_mm
+from ..mesh.sheets import in_words
+from ..mesh.sides import OutlineSide
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import Shape
 
@@ -45,11 +46,11 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
     particles = np.unique(mesh.edges[mesh.on_outline | _between(grouped, materials)])
     near = np.array([_distances(side, mesh.points[particles]) for side in sides]) <= small
     if not near.any(axis=0).all():
-        first = in_mm(tuple(mesh.points[particles[np.argmin(near.any(axis=0))]]), 6)
+        first = in_words(mesh.points[particles[np.argmin(near.any(axis=0))]])
         raise ValueError(f"mesh: its outline has a particle at {first}, on no side of {what}; {remedy}")
     if near.sum(axis=1).min() < 2:
         side = sides[int(np.argmin(near.sum(axis=1)))]
-        ends = f"from {in_mm(side.start, 6)} to {in_mm(side.end, 6)}"
+        ends = f"from {in_words(side.start)} to {in_words(side.end)}"
         raise ValueError(f"mesh: has no edge on the side of {what} {ends}; {remedy}")
     for name in shape.groups:
         own: Sequence[OutlineSide] = [side for side in sides if side.group == name]
@@ -62,8 +63,8 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
             raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of {what}; {remedy}")
     for name, point in shape.points.items():
         if name in grouped.points and np.linalg.norm(np.subtract(grouped.points[name], point)) > small:
-            there = in_mm(tuple(grouped.points[name]), 6)
-            raise ValueError(f"mesh: its point {name!r} is at {there}, that of {what} at {in_mm(point, 6)}; {remedy}")
+            there = in_words(grouped.points[name])
+            raise ValueError(f"mesh: its point {name!r} is at {there}, that of {what} at {in_words(point)}; {remedy}")
 
 
 def _between(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> np.ndarray:

@@ -87,7 +87,7 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
 
 
 def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
-    """Read a mesh of a beam, of any format that meshio knows; its lower left corner is put at the origin.
+    """Read a mesh of a beam, of Gmsh, Abaqus, MED or VTU; its lower left corner is put at the origin.
 
     Parameters
     ----------

@@ -52,9 +52,9 @@ def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | st
 
 
 def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
-    """Read the mesh of a shape with its groups, of any format that meshio knows.
+    """Read the mesh of a shape with its groups, of Gmsh, Abaqus, MED or VTU.
 
-    Groups are Gmsh's physical groups, sets of cells and of points in Abaqus and other files, and arrays of zeros and
+    Groups are Gmsh's physical groups, sets of Abaqus, groups of MED, and arrays of zeros and
     ones in VTU; the guide on mesh files says how each becomes sides, a point or a part.
 
     Parameters
