@@ -269,7 +269,8 @@ def winds_about(sides: tuple[OutlineSide, ...], point: Point) -> bool:
 
 def meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
     """Return where sides of rounds meet off shared corners, or None: round and side of both, and the point [m]."""
-    points, edges, reaches, names = [], [], [], []
+    points, edges, reaches = [], [], []
+    names: list[tuple[int, int]] = []
     size = max(math.dist(*extent(sides)) for sides in rounds)
     for which, sides in enumerate(rounds):
         corners, numbers = polygon(sides)
