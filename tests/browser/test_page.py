@@ -11,7 +11,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
 from springtune.problem.compare import sign_sentence
-from springtune.studies.output.colours import ERROR_COLOURS
+from springtune.studies.output.error_scale import ERROR_COLOURS
 
 CURVE = "springtune.views.cells.plots.curve.chart.sources.points.data.y.join()"
 SIZE = "springtune.views.cells.plots.size.chart.sources.points.data"

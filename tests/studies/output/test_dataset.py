@@ -24,7 +24,6 @@ from springtune.studies.kinds.bodies.tables import tables
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK, Group
-from springtune.studies.output.reading import lazily
 from springtune.studies.runs import provenance
 from springtune.studies.runs.source import clone, workflow_folder
 
@@ -114,7 +113,7 @@ def test_tables_of_a_few_scenes_among_many_cells_read_no_more_than_they_show(tmp
     root.message[asked] = "what buckles, \u03bb < 1"
     root.displacement[asked] = np.random.default_rng(1).random(root.displacement[asked].shape)
     dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
-    with lazily(tmp_path / "dataset.nc") as tree:
+    with st.open(tmp_path) as tree:
         found = tables(tree)
         unread = {name for name, array in tree.variables.items() if "values with dtype" in repr(array)}
     assert {"message", "solver", "displacement", "residual", "solve_seconds"} <= unread

@@ -14,7 +14,7 @@ from springtune.problem.compare import sign_sentence
 from springtune.problem.status import Status
 
 from . import labels, style
-from .colours import ERROR_COLOURS, ERROR_RANGE
+from .error_scale import ERROR_COLOURS, ERROR_RANGE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from ..config.kind import outputs
-from .reading import lazily
+from . import reading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +23,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     """Draw the figures of outputs into ``folder/figures``, and write their tables and other files."""
     made: list[Path] = []
     figures = Path(folder) / "figures"
-    # Arrays are read on demand: most are not shown.
-    with lazily(dataset) as tree:
+    with reading.open(dataset) as tree:
         for output in (outputs()[name] for name in names):
             if output.module:
                 made += _draw(output, tree, figures)

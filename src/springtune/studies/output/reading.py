@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from .dataset import Label
 
-LARGE_ARRAY = 2**20
-"""Larger arrays, in bytes, are read on demand."""
-
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
@@ -29,9 +26,6 @@ MOST_HELD = 1e9
 
 DEFLATED = 30.0
 """Largest ratio of content to file size for files above `MOST_HELD`."""
-
-BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
-"""Start of the name of a dimension without labels, which is never read."""
 
 MOST_CHUNKS = 1_000_000
 """Most chunks of an array."""
@@ -71,45 +65,43 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     Traceback (most recent call last):
     FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc
     """
-    file = dataset_file(path)
-    check(file)
-    try:
-        with bounded(MOST_HELD):
-            tree = _opened(file)
-    except Exception as error:  # of a damaged file the libraries raise whatever they trip over
-        raise ValueError(f"{file}: cannot be read ({reason(error)}); {REMEDY}") from None
-    try:
-        if "springtune_version" not in tree.attrs:
-            raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
-        name = tree.attrs.get("study", "unknown")
-        if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
-            raise ValueError(f"{file}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
-    except ValueError:
-        tree.close()
-        raise
-    return tree
+    from .dataset import tree  # here, since the page to browse does without xarray
 
-
-def _opened(path: Path) -> "xarray.DataTree":
-    """Open a file; large arrays of texts stay in it, since xarray would read them at the width of the longest text."""
-    import h5netcdf
-    import xarray as xr
-    from xarray.backends import CachingFileManager, H5NetCDFStore
-
-    groups = {}
     with ExitStack() as stack:
-        manager = CachingFileManager(h5netcdf.File, str(path), mode="r", kwargs={"decode_vlen_strings": True})
-        stack.callback(manager.close)
-        for name in ("/", *manager.acquire().groups):
-            store = H5NetCDFStore(manager, group=None if name == "/" else name)
-            variables, attributes = store.load()  # type: ignore[no-untyped-call]
-            for array in variables.values():
-                if array.dtype == object and array.nbytes > LARGE_ARRAY:
-                    del array.encoding["dtype"]
-            groups[name] = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
-        tree = xr.DataTree.from_dict(groups)
-        tree.set_close(stack.pop_all().close)
-    return tree
+        file = stack.enter_context(opened(path))
+        with legible(path), bounded(MOST_HELD):
+            found = tree(file)
+        found.set_close(stack.pop_all().close)
+    return found
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> "Iterator[h5py.File]":
+    """Context of the file of a dataset, which is known to be one of springtune."""
+    import h5py
+
+    from .netcdf import attributes_of
+
+    path = dataset_file(path)
+    check(path)
+    with legible(path), h5py.File(path) as file:
+        attributes = attributes_of(file)
+    if "springtune_version" not in attributes:
+        raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
+    name = attributes.get("study", "unknown")
+    if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
+        raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
+    with h5py.File(path) as file:
+        yield file
+
+
+@contextmanager
+def legible(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Context of a refusal of whatever the libraries raise when they trip over a damaged file."""
+    try:
+        yield
+    except Exception as error:
+        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
 
 
 def dataset_file(path: str | os.PathLike[str]) -> Path:
@@ -123,20 +115,11 @@ def dataset_file(path: str | os.PathLike[str]) -> Path:
     return file
 
 
-@contextmanager
-def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
-    """Context of a dataset with small arrays in memory and large ones read on demand."""
-    with open(path) as tree:
-        for node in tree.subtree:
-            for array in node.variables.values():
-                if array.nbytes <= LARGE_ARRAY:
-                    array.load()
-        yield tree
-
-
 def check(path: Path) -> None:
     """Refuse files that read other files, or that are small and state large content."""
     import h5py
+
+    from .netcdf import is_bare
 
     held = 0.0
 
@@ -147,7 +130,7 @@ def check(path: Path) -> None:
         array, shown = h5py.Dataset(one), clipped(name.decode(errors="replace"))
         if array.shape is None:
             raise ValueError(f"'{shown}' has no shape")
-        if array.attrs.get("NAME", b"").startswith(BARE_DIMENSION):
+        if is_bare(array):
             return
         chunk, texts = array.chunks or (), h5py.check_string_dtype(array.dtype)
         held += max(array.size, math.prod(chunk)) * int(one.get_type().get_size())

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from springtune.problem.compare import sign_sentence
 from springtune.problem.geometry import beam_label
 from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
 from springtune.problem.status import Status
 
 from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
+from .error_scale import sign_of_displacements
 
 if TYPE_CHECKING:
     from .dataset import Label
@@ -124,10 +124,9 @@ def sign_of_errors(data: xr.Dataset) -> str:
     """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
     if "reference_displacement" not in data:
         return ""
-    signs = np.sign(data.reference_displacement)
-    signs = signs if "load" in signs.dims else signs.expand_dims(load=[""])
-    signs = signs.sum([name for name in signs.dims if name != "load"])
-    return sign_sentence(dict(zip(signs["load"].values.tolist(), signs.values.tolist())))
+    references = data.reference_displacement
+    axes = {str(name): references[name].values.tolist() for name in references.dims}
+    return sign_of_displacements(references.values, axes)
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:

@@ -12,24 +12,23 @@ import os
 import re
 import sys
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import h5py
 import jinja2
 import numpy as np
-import xarray as xr
 from markupsafe import Markup
 
-from springtune.problem.compare import sign_sentence
 from springtune.registry import imported
 from springtune.safe_io.atomic import write_json, write_text
 
 from ...config.kind import modules
-from .. import reading
-from ..colours import ERROR_COLOURS, ERROR_RANGE
+from .. import netcdf, reading
+from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
 from . import View
 
 SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
@@ -46,8 +45,8 @@ def views() -> dict[str, View]:
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
-    with reading.open(dataset) as tree, reading.guarded(dataset):
-        groups = packed(tree)
+    with reading.opened(dataset) as file, reading.guarded(dataset):
+        groups = packed(file)
     attributes = groups[0]["attributes"]
     declared = {path: asdict(view) for path, view in views().items()}
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
@@ -106,11 +105,12 @@ ROOM = 4_200_000
 """Most characters of all numbers: the page with its library stays below 5 MB."""
 
 
-def packed(tree: xr.DataTree, room: int = ROOM) -> list[dict[str, Any]]:
+def packed(file: h5py.File, room: int = ROOM) -> list[dict[str, Any]]:
     """Describe and pack the groups of a dataset; of a large one the largest variables are left out, and named."""
-    root = tree.to_dataset()
-    own = [(node, {*map(str, node.to_dataset(inherit=False).variables)}) for node in tree.subtree]
-    groups = [_described(node, names, root) for node, names in own if names or node.path == "/"]
+    root = netcdf.variables(file)
+    children = [one for one in file.values() if isinstance(one, h5py.Group)]
+    groups = [_described(file, root, root)]
+    groups += [_described(group, own, root) for group in children if (own := netcdf.variables(group))]
     rows = [(group, row) for group in groups for row in group["variables"]]
     excess = sum(len(row["data"]) for _, row in rows) - room
     # Cells last: without them there is no table.
@@ -122,46 +122,56 @@ def packed(tree: xr.DataTree, room: int = ROOM) -> list[dict[str, Any]]:
     return groups
 
 
-def _described(node: xr.DataTree, own: set[str], root: xr.Dataset) -> dict[str, Any]:
-    """Describe and pack a group: its `own` variables, with labels that it may share with the group above."""
-    data = node.to_dataset()
+Variables = Mapping[str, netcdf.Stored]
+
+
+def _described(group: h5py.Group, own: Variables, root: Variables) -> dict[str, Any]:
+    """Describe and pack a group: its `own` variables, with labels that it may share with the `root`."""
     rows: list[dict[str, Any]] = []
-    sizes: dict[Any, int] = {}
-    for name, array in data.variables.items():
-        if name not in own:
+    sizes: dict[str, int] = {}
+    for name, stored in own.items():
+        sizes |= dict(zip(stored.dims, stored.array.shape))
+        if stored.dims == (name,):
             continue
-        sizes |= array.sizes
-        if array.dims == (name,):
-            continue
-        row: dict[str, Any] = {"name": name, "dims": list(array.dims)} | _words_on(array)
-        if "flag_meanings" in array.attrs:
-            meanings = str(array.attrs["flag_meanings"]).split()
-            flags = np.ravel(array.attrs.get("flag_values", range(len(meanings)))).tolist()
+        row: dict[str, Any] = {"name": name, "dims": list(stored.dims)} | _words_on(stored)
+        if "flag_meanings" in stored.attributes:
+            meanings = str(stored.attributes["flag_meanings"]).split()
+            flags = np.ravel(stored.attributes.get("flag_values", range(len(meanings)))).tolist()
             row["flags"] = dict(zip(map(str, flags), meanings))
-        values = array.values  # each read, packed and forgotten
+        values = _values(stored)  # each read, packed and forgotten
         if name == "status":
-            values = _judged(data, row, values)
-        elif ERROR.search(str(name)) and row.get("units", "1") == "1":
+            values = _judged(own, row, values)
+        elif ERROR.search(name) and row.get("units", "1") == "1":
             row["error"] = True
             if _signed(row, values):
-                row |= {"signed": True, "sign": _sign(str(name), data, root)}
+                row |= {"signed": True, "sign": _sign(name, own, root)}
         rows.append(row | _variable(values))
-    dims = []
-    for name, size in sizes.items():
-        dims.append({"name": name, "size": size})
-        if name in data.coords:
-            dims[-1] |= {
-                "labels": [_plain(one) for one in data[name].values.tolist()],
-                **_words_on(data[name].variable),
-            }
-    attributes = {str(key): _plain(value) for key, value in data.attrs.items()}
-    return {"path": node.path, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
+    dims = [{"name": name, "size": size} | _labels(name, own, root) for name, size in sizes.items()]
+    attributes = {name: _plain(value) for name, value in netcdf.attributes_of(group).items() if name != "coordinates"}
+    return {"path": group.name, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
 
 
-def _words_on(array: xr.Variable) -> dict[str, str]:
-    """Attributes in words; netCDF's own library writes texts of one letter as bytes."""
-    found = {key: array.attrs[key] for key in ("units", "long_name") if key in array.attrs}
-    return {key: one.decode(errors="replace") if isinstance(one, bytes) else str(one) for key, one in found.items()}
+def _labels(name: str, own: Variables, root: Variables) -> dict[str, Any]:
+    """Labels of a dimension, if it has any, and words on it."""
+    stored = own.get(name) or root.get(name)
+    return {"labels": list(map(_plain, stored.read().tolist()))} | _words_on(stored) if stored else {}
+
+
+def _words_on(stored: netcdf.Stored) -> dict[str, str]:
+    """Attributes in words."""
+    return {name: str(stored.attributes[name]) for name in ("units", "long_name") if name in stored.attributes}
+
+
+def _values(stored: netcdf.Stored) -> np.ndarray:
+    """Values of an array; missing integers are NaN."""
+    values, fill = stored.read(), stored.attributes.get("_FillValue")
+    return np.where(values == fill, np.nan, values) if fill is not None and values.dtype.kind in "iu" else values
+
+
+def _spread(stored: netcdf.Stored, dims: Sequence[str]) -> np.ndarray:
+    """Values of an array whose axes are those of `dims`, of one place where it has none."""
+    values = stored.read().transpose([stored.dims.index(name) for name in dims if name in stored.dims])
+    return values[tuple(slice(None) if name in stored.dims else None for name in dims)]
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -177,18 +187,14 @@ REFERENCES = {
 """What an error is against, where that is no `reference_displacement`."""
 
 
-def _judged(data: xr.Dataset, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
+def _judged(own: Variables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
     """Statuses, of which solved cells that the linear reference cannot judge get one of their own."""
     flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
-    if (
-        "solved" not in flags
-        or "reference_applies" not in data
-        or not set(data.reference_applies.dims) <= set(row["dims"])
-    ):
+    applies = own.get("reference_applies")
+    if "solved" not in flags or applies is None or not set(applies.dims) <= set(row["dims"]):
         return status
     beyond = max(flags.values()) + 1
-    applies = data.reference_applies.broadcast_like(data.status).transpose(*row["dims"]).values
-    found = np.where((status == flags["solved"]) & (applies == 0), beyond, status)
+    found = np.where((status == flags["solved"]) & (_spread(applies, row["dims"]) == 0), beyond, status)
     if (found == beyond).any():
         row["flags"][str(beyond)] = "beyond_linear"
     return found
@@ -201,36 +207,24 @@ def _signed(row: dict[str, Any], values: np.ndarray) -> bool:
     return "without sign" not in said and bool(stated or (values < 0).any())
 
 
-def _sign(name: str, data: xr.Dataset, root: xr.Dataset) -> str:
+def _sign(name: str, own: Variables, root: Variables) -> str:
     """Which sign of a group's errors means too soft, by their references."""
     reference = REFERENCES.get(name, "reference_displacement")
-    reference = reference if reference in data else "reference_displacement"
-    of = data if reference in data else root
-    if reference not in of or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
+    reference = reference if reference in own else "reference_displacement"
+    group = own if reference in own else root
+    if reference not in group or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
         return "positive: too large"
-    signs, others = xr.apply_ufunc(np.sign, of[reference]), False
-    if "quantity_kind" in of:
-        displacements = of.quantity_kind == "displacement"
-        others = bool((signs.notnull() & ~displacements).any())
-        signs = signs.where(displacements)
-    said = _sign_of_displacements(signs)
+    dims, others = group[reference].dims, False
+    values = group[reference].read()
+    if "quantity_kind" in group:
+        displacements = _spread(group["quantity_kind"], dims) == "displacement"
+        others = bool((np.isfinite(values) & ~displacements).any())
+        values = np.where(displacements, values, np.nan)
+    axes = {one: _labels(one, own, root).get("labels", ()) for one in dims}
+    said = sign_of_displacements(values, axes)
     if not others:
         return said
     return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
-
-
-def _sign_of_displacements(signs: xr.DataArray) -> str:
-    """Sentence by loads or quantities, whichever tell signs apart; empty without any sign."""
-    known = signs.values[np.isfinite(signs.values) & (signs.values != 0)]
-    if not known.size or (known == known[0]).all():
-        return sign_sentence({"": known[0]}) if known.size else ""
-    for name, where in (("load", "under"), ("quantity", "of")):
-        if name in signs.dims:
-            others = [one for one in signs.dims if one != name]
-            low, high = signs.min(others), signs.max(others)
-            if not ((low < 0) & (high > 0)).any():
-                return sign_sentence(dict(zip(signs[name].values.tolist(), (low + high).values.tolist())), where)
-    return "too soft: errors with the sign of their reference"
 
 
 # -- arrays ------------------------------------------------------------------------------------------------------------
