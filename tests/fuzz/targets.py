@@ -21,8 +21,8 @@ from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.bodies.beam_plan import stem
 from springtune.studies.kinds.bodies.kind import summary
+from springtune.studies.kinds.bodies.plan import stem
 
 CONFIG = Path(__file__).parents[2] / "config"
 STUDIES = ("quick", "paper", "block", "laying", "stability")

@@ -6,7 +6,7 @@ import pytest
 
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
-from springtune.studies.kinds.bodies import beam_plan
+from springtune.studies.kinds.bodies.plan import mesh_key, stem
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import attempts, job, rerun
@@ -40,7 +40,7 @@ class Campaign:
     """A study of this folder, as it is to be run now."""
 
     def __init__(self, config):
-        for cache in (beam_plan.mesh_key, beam_plan.stem):  # a run is a process of its own, and files change
+        for cache in (mesh_key, stem):  # a run is a process of its own, and files change
             cache.cache_clear()
         self.config, self.study = str(config), load_study(config)
         self.folder = Path("results") / self.study.name

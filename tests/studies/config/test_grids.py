@@ -361,7 +361,7 @@ def test_who_needs_a_field_has_it_whoever_asks_first(here):
 
 def test_what_is_interpolated_is_no_part_of_what_a_network_depends_on(here):
     """Another range of Poisson's ratio is another interpolant, and the same networks."""
-    from springtune.studies.kinds.bodies.beam_plan import scene_tasks
+    from springtune.studies.kinds.bodies.plan import scene_tasks
 
     keys = []
     for last, points in (("0.4", "61"), ("0.45", "71")):

@@ -11,7 +11,7 @@ import pytest
 
 import springtune as st
 from springtune.problem.materials import material_of
-from springtune.studies.kinds.bodies import beam_plan
+from springtune.studies.kinds.bodies import plan
 from springtune.studies.kinds.bodies.errors import like_with_like
 from springtune.studies.kinds.moduli.figures import decision
 from springtune.studies.runs.keys import material_key
@@ -59,9 +59,9 @@ def test_a_test_is_part_of_the_keys_of_what_is_stored(here):
 
     def keys(text=STUDY):
         found = study(text)
-        tasks = [task for tasks in beam_plan.scene_tasks(found).values() for task in tasks]
+        tasks = [task for tasks in plan.scene_tasks(found).values() for task in tasks]
         scenes = {task["key"] for task in tasks if task["material"].get("coefficients")}
-        return scenes | {beam_plan.finite_key(one, "yeoh-plane-stress") for one in found.references[:1]}
+        return scenes | {plan.finite_key(one, "yeoh-plane-stress") for one in found.references[:1]}
 
     first, file = keys(), here / "uniaxial.csv"
     file.write_text("# read again\n" + file.read_text())

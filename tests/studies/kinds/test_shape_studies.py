@@ -15,8 +15,8 @@ from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies import mesh, stored
+from springtune.studies.kinds.bodies.plan import shape_mesh_key, shape_reference_task, shape_scene_task
 from springtune.studies.kinds.bodies.shape_expand import READ_AT_ONCE
-from springtune.studies.kinds.bodies.shape_plan import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.bodies.task_values import ONE_LOAD, geometry, named, shape_of
 from springtune.studies.kinds.bodies.task_values import load as values_of
 from springtune.studies.kinds.moduli.figures import definitions
@@ -75,17 +75,22 @@ def test_scenes_are_in_one_order_and_each_once(load):
 
 def test_keys_know_no_labels(load):
     """A quantity that is renamed, or of which another value is expected, a load, a shape: nothing is solved again."""
-    one = load(COOK).shapes
+    one = load(COOK)
     text = COOK.replace("cook", "panel").replace("shear:", "other:").replace("third", "soft")
     text = text.replace("tip: {displacement", "end: {displacement").replace("23.96 mm, source: somebody", "24 mm")
-    two = load(text, "two.yaml").shapes
-    for first, second in zip(one.scenes, two.scenes):
-        assert mesh_key(one, first) == mesh_key(two, second)
-        assert scene_task(one, first)["key"] == scene_task(two, second)["key"]
-    assert reference_task(one, "cook", "third", "shear")["key"] == reference_task(two, "panel", "soft", "other")["key"]
-    stiffer = load(COOK.replace("1 MPa", "2 MPa"), "stiffer.yaml").shapes
-    assert mesh_key(one, one.scenes[0]) == mesh_key(stiffer, stiffer.scenes[0])
-    assert scene_task(one, one.scenes[0])["key"] != scene_task(stiffer, stiffer.scenes[0])["key"]
+    two = load(text, "two.yaml")
+    for first, second in zip(one.shapes.scenes, two.shapes.scenes):
+        assert shape_mesh_key(one, first) == shape_mesh_key(two, second)
+        assert shape_scene_task(one, first)["key"] == shape_scene_task(two, second)["key"]
+    assert (
+        shape_reference_task(one, "cook", "third", "shear")["key"]
+        == shape_reference_task(two, "panel", "soft", "other")["key"]
+    )
+    stiffer = load(COOK.replace("1 MPa", "2 MPa"), "stiffer.yaml")
+    assert shape_mesh_key(one, one.shapes.scenes[0]) == shape_mesh_key(stiffer, stiffer.shapes.scenes[0])
+    assert (
+        shape_scene_task(one, one.shapes.scenes[0])["key"] != shape_scene_task(stiffer, stiffer.shapes.scenes[0])["key"]
+    )
 
 
 def test_grids_and_shapes_share_the_axes_of_a_dataset(load):
@@ -226,15 +231,14 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
     assert abs(float(cell.error)) < 0.01
     # The file is part of the keys, its place is not.
-    part = study.shapes
-    before = mesh_key(part, part.scenes[0])
+    before = shape_mesh_key(study, study.shapes.scenes[0])
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "plate.vtu").rename(tmp_path / "elsewhere/plate.vtu")
     moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.vtu"}}}
-    part = load(yaml.safe_dump(moved), "moved.yaml").shapes
-    assert mesh_key(part, part.scenes[0]) == before
+    part = load(yaml.safe_dump(moved), "moved.yaml")
+    assert shape_mesh_key(part, part.shapes.scenes[0]) == before
     write_mesh(tmp_path / "elsewhere/plate.vtu", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
-    assert mesh_key(part, part.scenes[0]) != before
+    assert shape_mesh_key(part, part.shapes.scenes[0]) != before
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,14 @@ import pytest
 from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies import any_reference, collect, reference
-from springtune.studies.kinds.bodies.beam_plan import (
+from springtune.studies.kinds.bodies.kind import summary
+from springtune.studies.kinds.bodies.plan import (
     box_of,
     expected_solves,
     interpolants,
     reference_of,
     solved_reference,
 )
-from springtune.studies.kinds.bodies.kind import summary
 from springtune.studies.runs import store
 from springtune.studies.runs.attempts import Attempts
 from springtune.studies.runs.plan import plan

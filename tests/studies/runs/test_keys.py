@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.kinds.bodies.beam_plan import OF_OTHERS
+from springtune.studies.kinds.bodies.plan import OF_OTHERS
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
@@ -119,7 +119,7 @@ def _keys():
     found = {stage.module.removeprefix("studies.kinds."): keys.stage_key(stage.module) for stage in stages()}
     of_beams = ("studies.kinds.bodies.shape_reference", "reference.finite_strain", "reference.interpolant")
     found["unit"] = keys.stage_key("studies.kinds.bodies.reference", without=of_beams)
-    found["box"] = keys.stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.shape_mesh",))
+    found["box"] = keys.stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
     found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=OF_OTHERS)
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
     return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}

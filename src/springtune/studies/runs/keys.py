@@ -7,8 +7,8 @@ closure is all modules that it imports, directly or not, by grimp: also inside f
 checkers. Import from modules, not from packages: an ``__init__`` brings in all that it imports.
 
 Imports by a name in a text are not seen. Definitions and mesh types are added where they are chosen
-(`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`. A template counts with the module that
-has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
+(`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`. A template or a table counts with the
+module that has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
 """
 
 import ast
@@ -131,9 +131,10 @@ def full_name(module: str) -> str:
 
 
 def _files(name: str) -> Iterator[Path]:
-    """File of a module of this package, and the templates of its name."""
+    """File of a module of this package, and the table and the templates of its name."""
     path = PACKAGE.parent.joinpath(*name.split("."))
     yield path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    yield from path.parent.glob(f"{path.name}.csv")
     yield from (path.parent / "templates").glob(f"{path.name}.*.jinja")
 
 

@@ -1,9 +1,461 @@
 """Groups of a dataset of beams, in the root, and of shapes."""
 
-from . import beam_collect, shape_collect
+from functools import cache
+from itertools import product
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.boundary import FACE_POSITIONS
+from springtune.problem.compare import deformation_error
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Rubber
+from springtune.problem.shapes import QUANTITY_UNITS
+from springtune.problem.status import Status
+from springtune.reference.answers import beyond_linear, interpolate, objection, outline
+from springtune.springs.lattice import predicted_stiffness
+
+from ...config.model import Reference, keeps_fields
+from ...output.dataset import NO_NODE
+from ...output.selection import OF_FIELDS
+from ...runs import store
+from . import any_reference, plan, stored
+from .outputs import CASE_AXES, DRAWING, MESH_AXES, pressed
+from .stored import FIELD_ARRAYS, fields_key, stored_key
+from .task_values import named, quantity_key
+from .variables import (
+    AT_FINITE_STRAIN,
+    BLOCK,
+    CELL,
+    FIELDS,
+    FINITE_STRAIN,
+    OF_PRINT,
+    ROOT,
+    SENSITIVITY,
+    SHAPE_FIELDS,
+    SHAPES,
+    fields_of,
+    swept,
+)
+
+FACE_VARIABLES = {
+    "displacement": "face_displacement",
+    "face_mean": "face_mean_displacement",
+    "face_profile": "face_profile",
+    "last_displacement": "last_face_displacement",
+}
+"""Values of a pressed face by their names in a result."""
 
 
 def groups(study, folder):
-    """Groups of a dataset by name: ``folder`` has the stored results of a study."""
-    beams = beam_collect.groups(study, folder) if study.scenes else {}
-    return beams | (shape_collect.groups(study, folder) if study.shapes else {})
+    """Groups of a dataset by name, from the stored results of a study in a folder."""
+    beams = _beams(study, folder) if study.scenes else {}
+    return beams | (_shapes(study, folder) if study.shapes else {})
+
+
+# -- what beams and shapes share ---------------------------------------------------------------------------------------
+
+
+def _with_objection(result, message, why):
+    """Message of a scene; of a solved one with the objection to its reference."""
+    return "; ".join(filter(None, (message, why if result["status"] in (Status.SOLVED, Status.UNSTABLE) else "")))
+
+
+def _fields_of_rows(group, axes, rows):
+    """Group of whole fields; its dimensions are as long as the longest arrays."""
+
+    def longest(name, axis=0, least=1):
+        return tuple(range(max((row[name].shape[axis] for row in rows if name in row), default=least) or 1))
+
+    axes = axes | {"particle": longest("x"), "spring": longest("spring_nodes"), "spring_end": (0, 1)}
+    axes |= {"cell": longest("cell_nodes"), "cell_corner": longest("cell_nodes", 1, least=3)}
+    found = group.of_rows(axes | {"outline_point": longest("outline_x")}, rows)
+    return found.assign_attrs(Conventions="CF-1.11 UGRID-1.0")
+
+
+def _mesh_row(mesh):
+    """Values of a mesh at rest; a cell with fewer corners than another one has no node at the last."""
+    cells = np.full((sum(map(len, mesh.cells.values())), max(mesh.cells)), NO_NODE)
+    start = 0
+    for count, corners in mesh.cells.items():
+        cells[start : start + len(corners), :count] = corners
+        start += len(corners)
+    return {"x": mesh.points[:, 0], "y": mesh.points[:, 1], "spring_nodes": mesh.edges, "cell_nodes": cells}
+
+
+def _network_row(arrays):
+    """Values of a network from its stored arrays."""
+    x, y = arrays["displacements"].T
+    row = {"displacement_x": x, "displacement_y": y, "spring_force": arrays["spring_forces"]}
+    return row | {"stiffness": arrays["spring_stiffnesses"]}
+
+
+def _outline_row(points, moved):
+    """Values of the outline of a reference at rest, and its displacements."""
+    values = {"outline_x": points[:, 0], "outline_y": points[:, 1]}
+    return values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}
+
+
+# -- beams -------------------------------------------------------------------------------------------------------------
+
+
+def _beams(study, folder):
+    """Groups of beams."""
+    axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
+    read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
+    answers = {one: read(one.beam, one.material, one.load) for one in study.references}  # for 1 N: each is read once
+    planes = [{"material": one.name, "material_plane": one.plane} for one in {one.material for one in answers}]
+    cells, faces, fields = _scenes(study, folder, answers)
+    meshes = [mesh.labels | stored.read_notes(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes]
+    rows = [*planes, *_bodies(study), *meshes, *_references(study, answers), *cells, *_printed(study)]
+    data = swept(ROOT, study).of_rows(axes, rows)
+    _comment(data, answers)
+    _compare(data.deformation_error, data.displacement, data.reference_displacement)
+    found = {ROOT.name: data}
+    if study.curves:
+        found[SENSITIVITY.name] = swept(SENSITIVITY, study).of_rows(axes, _curves(study, folder, answers))
+    if study.further_references:
+        rows = [*planes, *_finite_references(study, folder)]
+        finite = swept(FINITE_STRAIN, study).of_rows(axes | {"reference": study.further_references}, rows)
+        _compare(finite.deformation_error, data.displacement, finite.reference_displacement)
+        found[FINITE_STRAIN.name] = finite
+    if pressed(study):
+        kinds = _small_strain(study), *study.further_references
+        rows = [*planes, *_face_references(study, folder, kinds), *faces]
+        axes_of_faces = axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}
+        block = found[BLOCK.name] = swept(BLOCK, study).of_rows(axes_of_faces, rows)
+        _compare(block.face_error, block.face_displacement, block.reference_face_displacement)
+    if keeps_fields(study):
+        found[FIELDS.name] = _fields_of_rows(fields_of(study), axes, [*fields, *_at_rest(study, folder)])
+    return found
+
+
+def _bodies(study):
+    """Rows of materials and beams."""
+    for one in {scene.material for scene in study.scenes}:
+        own = {"young_modulus": one.young_modulus, "poisson_ratio": one.poisson_ratio}
+        own["density"] = np.nan if one.density is None else one.density
+        yield {"material": one.name} | own | {f"material_{name}": value for name, value in own.items()}
+    for one in {scene.mesh.beam for scene in study.scenes}:
+        extents = {f"beam_{name}": getattr(one, name) for name in ("length", "height", "thickness")}
+        yield {"beam": one.name, "thickness": one.thickness} | extents
+
+
+def _comment(data, answers):
+    """Comment on fits of rubbers, and on references that are interpolated."""
+    rubbers = {one.material.name: one.material for one in answers if isinstance(one.material, Rubber)}
+    if rubbers:
+        data.material_young_modulus.attrs["comment"] = "; ".join(
+            f"{law.name}: Yeoh's law of {', '.join(f'{c:.6g}' for c in law.coefficients)} Pa, fitted to a uniaxial "
+            "test; root mean square of its relative errors "
+            + ", ".join(f"{100 * error:.2g} % ({test})" for test, error in law.errors.items())
+            for _, law in sorted(rubbers.items())
+        )
+    if interpolated := sum("solves" in result for result in answers.values()):
+        data.reference_displacement.attrs["comment"] = (
+            f"{interpolated} of {len(answers)} are interpolated between finite-element solutions over aspect ratio and "
+            "Poisson's ratio, which is part of reference_error_estimate; they have no field_error"
+        )
+
+
+def _references(study, answers):
+    """Rows of references."""
+    for one, result in answers.items():
+        labels = study.labels(one)
+        for kinematics in study.axes["kinematics"]:
+            applies = not objection(result, one.force, kinematics)
+            yield labels | {"kinematics": kinematics, "reference_applies": applies}
+        row = {"force": one.force, "reference_seconds": result["seconds"]} | labels
+        row["reference_message"] = objection(result, one.force, "nonlinear")
+        if "displacement" in result:
+            row |= {
+                "reference_displacement": one.force * result["displacement"],
+                "reference_error_estimate": result["error_estimate"],
+                "reference_rotation": abs(one.force) * result["rotation"],
+                "reference_strain": abs(one.force) * result["strain"],
+            }
+        yield row
+
+
+def _reference(study, folder, one, fields=()):
+    reference = plan.reference_of(study, one.beam, one.material, one.load)
+    return any_reference.read(folder / "references", reference, fields)
+
+
+def _scenes(study, folder, answers):
+    """Rows of the scenes in the root, of pressed faces, and of whole fields; each file is read once."""
+    names = "beam", "material", "load", *(one for one in study.swept if one != "stiffness_scale")
+    objections = {
+        (*study.labels(one).values(), kinematics): objection(result, one.force, kinematics)
+        for one, result in answers.items()
+        for kinematics in study.axes["kinematics"]
+    }
+    calibration = stored.read_calibration(folder)
+    cells, faces, fields = [], [], []
+    for mesh, tasks in plan.scene_tasks(study).items():
+        keys = [stored_key(task, calibration) for task in tasks]
+        path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
+        results = store.read(path, set(keys), ["face_profile"] if pressed(study) else [])
+        kept = {fields_key(key) for task, key in zip(tasks, keys) if keeps_fields(study) and "keep_fields" in task}
+        arrays = store.read(path, kept, [*FIELD_ARRAYS]) if kept else {}
+        for scene, key in zip(plan.scenes_by_mesh(study)[mesh], keys):
+            result, labels = results[key], study.labels(scene)
+            against = objections[*(labels[name] for name in names), scene.kinematics]
+            message = _with_objection(result, result.get("message", ""), against)
+            cells.append(result | labels | {"message": message, "solve_seconds": result["seconds"]})
+            if LOADS[scene.load].kind.pressed:
+                faces.append(labels | {new: result[old] for old, new in FACE_VARIABLES.items() if old in result})
+            if found := arrays.get(fields_key(key)):
+                fields.append(labels | _network_row(found))
+    return cells, faces, fields
+
+
+def _printed(study):
+    """Rows of printed cells that the study asks for."""
+    for cell in study.printed:
+        labels = {name: getattr(cell, name) for name in CELL}
+        if all(label in study.axes[name] for name, label in labels.items()):
+            own = (name for name in ROOT.variables if name.startswith(OF_PRINT))
+            yield labels | {name: getattr(cell, name.removeprefix(OF_PRINT)) for name in own}
+
+
+def _curves(study, folder, answers):
+    """Rows of sensitivity curves."""
+    for mesh, curves in plan.curves_by_mesh(study).items():
+        tasks = [plan.curve_task(study, curve) for curve in curves]
+        path = folder / "curves" / f"{plan.stem(mesh)}.h5"
+        results = store.read(path, [task["key"] for task in tasks], ["displacement", "stable"])
+        for curve, task in zip(curves, tasks):
+            result, reference = results[task["key"]], Reference(mesh.beam, curve.material, curve.load, curve.force)
+            displacement = result["displacement"]
+            wanted = curve.force * answers[reference].get("displacement", np.nan)
+            status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
+            row = {name: result[name] for name in ("displacement", "message", "best_stiffness")} | study.labels(curve)
+            row |= {f"best_stiffness_{name}": result[f"best_{name}"] for name in ("status", "message")}
+            yield row | {
+                "stiffness": np.array(task["stiffnesses"]),
+                "status": np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status),
+                "curve_seconds": result["seconds"],
+                "deformation_error": deformation_error(displacement, wanted),
+                "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
+            }
+
+
+def _small_strain(study):
+    """Name of the reference of small strain, by the planes of the materials."""
+    planes = {one.material.plane for one in study.references}
+    return "small-strain" if len(planes) > 1 else f"small-strain-plane-{planes.pop()}"
+
+
+def _finite_references(study, folder):
+    """Rows of references at finite strain."""
+    for one, kind in product(study.references, study.further_references):
+        result, known = _finite_reference(folder, one, kind), ("message", "displacement", "error_estimate")
+        values = {f"reference_{name}": result[name] for name in known if name in result}
+        yield study.labels(one) | {"reference": kind} | values
+
+
+def _finite_reference(folder, one, kind, fields=()):
+    return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
+
+
+def _compare(error, network, reference):
+    """Write deformation errors where both displacements are known: often few cells."""
+    network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
+    there = np.isfinite(network) & np.isfinite(reference)
+    error.values[there] = deformation_error(network[there], reference[there])
+
+
+def _face_references(study, folder, kinds):
+    """Rows of pressed faces of references: middle, mean and profile."""
+    from scipy.interpolate import CubicSpline  # here: only pressed faces need it
+
+    for one, kind in product((one for one in study.references if LOADS[one.load].kind.pressed), kinds):
+        if kind in study.further_references:
+            result, scale = _finite_reference(folder, one, kind, ["positions", "profile"]), 1.0
+        else:
+            result, scale = _reference(study, folder, one, ["x", "displacements"]), one.force
+            if "x" in result:
+                result |= {"positions": result["x"] / one.beam.length, "profile": result["displacements"][:, -1, 1]}
+        row = study.labels(one) | {"reference": kind, "reference_message": result["message"]}
+        if "displacement" in result:
+            row |= {
+                "reference_face_displacement": scale * result["displacement"],
+                "reference_face_mean_displacement": scale * result["mean_displacement"],
+                "reference_error_estimate": result["error_estimate"],
+            }
+        if "profile" in result:  # one that is interpolated has none
+            profile = CubicSpline(result["positions"], result["profile"])
+            row["reference_face_profile"] = scale * profile(FACE_POSITIONS)
+        yield row
+
+
+def _at_rest(study, folder):
+    """Rows of meshes, outlines, and references at the particles of the scenes whose fields are stored."""
+    shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
+    meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
+    yield from (mesh.labels | _mesh_row(found.mesh) for mesh, found in meshes.items() if found)
+    compared = set()  # scenes differ in their definitions
+    for scene in shown:
+        labels = study.labels(scene)
+        yield labels | {f"{OF_FIELDS}{name}": labels[name] for name in study.swept}
+        one = Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
+        if (scene.mesh, one) in compared:
+            continue
+        compared.add((scene.mesh, one))
+        result = _reference(study, folder, one, ["x", "y", "displacements"])
+        if "x" not in result:
+            continue
+        x, y, moved = result["x"], result["y"], one.force * result["displacements"]
+        yield labels | _outline_row(*outline(x, y, moved))
+        if found := meshes[scene.mesh]:
+            along = interpolate(x, y, moved, found.mesh.points).T
+            yield labels | dict(zip(("particle_reference_x", "particle_reference_y"), along))
+
+
+# -- shapes ------------------------------------------------------------------------------------------------------------
+
+
+def _shapes(study, folder):
+    """Groups of shapes."""
+    shapes = study.shapes
+    answers = {case: _answer(study, folder, *case) for case in shapes.referred}
+    rows = [*_quantities(shapes), *_shape_references(study, answers), *_shape_scenes(study, folder, answers)]
+    found = {SHAPES.name: SHAPES.of_rows(study.axes, rows)}
+    if shapes.finite:
+        found[AT_FINITE_STRAIN.name] = _shapes_at_finite_strain(study, folder, found[SHAPES.name].value)
+    if DRAWING in study.outputs:
+        found[SHAPE_FIELDS.name] = _shape_fields(study, folder)
+    return found
+
+
+def _answer(study, folder, *case, arrays=()):
+    """Stored result of a reference: of a shape, material and load, and a law at finite strain."""
+    return store.read_one(folder / "references", plan.shape_reference_task(study, *case)["key"], arrays)
+
+
+def _quantities(shapes):
+    """Rows of what quantities are."""
+    for shape, load in dict.fromkeys((one.shape, one.load) for one in shapes.scenes):
+        yield {"shape": shape, "shape_thickness": shapes.shape[shape].thickness}
+        for one in shapes.shape[shape].loads[load].quantities:
+            about = {f"quantity_{name}": getattr(one, name) for name in ("kind", "component", "of")}
+            about |= {"quantity_units": QUANTITY_UNITS[one.kind], "source": one.source, "expected_value": one.expected}
+            yield {"shape": shape, "load": load, "quantity": one.name} | about
+
+
+def _whys(shapes, shape, load, result):
+    """Why a reference, or a quantity of it, is missing, in the names of the study."""
+    whys = (result["message"], *result.get("lacking", {}).values())
+    return [named(why, shapes.shape[shape], shapes.shape[shape].loads[load]) for why in whys if why]
+
+
+def _shape_objection(result, kinematics):
+    """Why a reference does not apply to networks of some kinematics."""
+    return "" if result["message"] or kinematics == "linear" else beyond_linear(result["rotation"], result["strain"])
+
+
+def _shape_references(study, answers):
+    """Rows of references."""
+    for (shape, material, load), result in answers.items():
+        labels = {"shape": shape, "material": material, "load": load}
+        whys = [*_whys(study.shapes, shape, load, result), _shape_objection(result, "nonlinear")]
+        row = {f"reference_{name}": result.get(name) for name in ("seconds", "unknowns", "rotation", "strain")}
+        yield labels | row | {"reference_message": "; ".join(filter(None, whys))}
+        if result["message"]:
+            continue
+        for kinematics in study.axes["kinematics"]:
+            yield labels | {"kinematics": kinematics, "reference_applies": not _shape_objection(result, kinematics)}
+        for one in study.shapes.shape[shape].loads[load].quantities:
+            row = labels | {"quantity": one.name} | _value(result, one)
+            yield row | {"reference_expected_error": _error(row["reference_value"], one.expected)}
+
+
+def _shapes_at_finite_strain(study, folder, values):
+    """Group of references at finite strain, and the errors of the networks with their law."""
+    shapes, rows, references = study.shapes, [], {}
+    for shape, material, load, law in shapes.finite:
+        result = _answer(study, folder, shape, material, load, law)
+        labels = {"shape": shape, "material": material, "load": load, "law": law}
+        references[shape, material, load, law] = result.get("values", {})
+        rows.append(labels | {"reference_message": "; ".join(_whys(shapes, shape, load, result))})
+        for one in shapes.shape[shape].loads[load].quantities if not result["message"] else ():
+            rows.append(labels | {"quantity": one.name} | _value(result, one))
+    for one in shapes.scenes:
+        reference = references.get((one.shape, one.material, one.load, one.law), {})
+        for quantity in shapes.shape[one.shape].loads[one.load].quantities if reference else ():
+            labels = vars(one) | {"quantity": quantity.name}
+            error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
+            rows.append(labels | {"error": error})
+    laws = tuple(dict.fromkeys(law for *_, law in shapes.finite))
+    return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
+
+
+def _value(result, quantity):
+    """Value of a quantity in a reference that did not fail, and its error estimate."""
+    key = quantity_key(quantity)
+    names = {"reference_value": "values", "reference_error_estimate": "error_estimates"}
+    return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
+
+
+def _shape_scenes(study, folder, answers):
+    """Rows of meshes and scenes."""
+    for file, scenes in plan.shape_scenes_by_mesh(study).items():
+        labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
+        yield labels | stored.read_notes(folder / "meshes", file)
+        keys = {one: plan.shape_scene_task(study, one)["key"] for one in scenes}
+        results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
+        for one, key in keys.items():
+            yield from _shape_scene(study.shapes, one, results[key], answers.get((one.shape, one.material, one.load)))
+
+
+def _shape_scene(shapes, one, result, reference):
+    """Rows of a scene."""
+    labels, case, whys = vars(one), shapes.shape[one.shape].loads[one.load], []
+    if reference:
+        whys = [f"no reference: {why}" for why in _whys(shapes, one.shape, one.load, reference)]
+        whys.append(_shape_objection(reference, one.kinematics))
+    message = named(result.get("message", ""), shapes.shape[one.shape], case)
+    message = _with_objection(result, message, "; ".join(filter(None, whys)))
+    yield result | labels | {"solve_seconds": result["seconds"], "message": message}
+    known = (reference or {}).get("values", {})
+    for quantity in case.quantities:
+        key = quantity_key(quantity)
+        value = result.get("values", {}).get(key, np.nan)
+        errors = {"error": _error(value, known.get(key, np.nan)), "expected_error": _error(value, quantity.expected)}
+        yield labels | {"quantity": quantity.name, "value": value} | errors
+
+
+def _error(value, reference):
+    """Signed relative error; NaN where there is nothing to divide by."""
+    return deformation_error(value, reference) if reference else np.nan
+
+
+def _shape_fields(study, folder):
+    """Group of the drawn networks."""
+    drawn, cases = plan.drawn_scenes(study), {}
+    for one in (one for one in study.shapes.scenes if one in drawn):
+        cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
+    rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(study, folder, scenes)]
+    return _fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
+
+
+def _drawn(study, folder, scenes):
+    """Rows of a case: its labels, outline, mesh and networks."""
+    one, file = scenes[0], plan.shape_stem(scenes[0])
+    about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
+    yield about | {"case_mesh_size": one.mesh_size}
+    body = one.shape, one.material, one.load
+    if body in study.shapes.referred:
+        found = _answer(study, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths"))
+        if not found["message"]:
+            sizes = found["outline_lengths"]
+            rounds = {"outline_round": np.repeat(np.arange(len(sizes)), sizes)}
+            yield rounds | _outline_row(found["outline_points"], found["outline_displacements"])
+    if grouped := stored.read(folder / "meshes", file):
+        yield _mesh_row(grouped.mesh)
+        keys = {scene: fields_key(plan.shape_scene_task(study, scene)["key"]) for scene in scenes}
+        results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()), [*FIELD_ARRAYS])
+        for scene, key in keys.items():
+            if results[key]:
+                yield {"definition": scene.definition} | _network_row(results[key])

@@ -17,11 +17,9 @@ from springtune.safe_io.tables import aligned
 
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study
-from .beam_plan import expected_solves, interpolants, reference_of
-from .outputs import OUTPUTS, OWN_FILE, stems
-from .shape_plan import by_mesh
+from .outputs import OUTPUTS, OWN_FILE, mesh_name, stems
+from .plan import STAGES, expected_solves, interpolants, reference_of
 from .shape_sections import SHAPE_GRIDS_KEY, SHAPES_KEY
-from .stages import STAGES
 
 
 def _check(config, problems):
@@ -72,7 +70,7 @@ def _summary(found):
     cases = {(one.shape, one.load) for one in shapes.scenes}
     quantities = sum(len(shapes.shape[shape].loads[load].quantities) for shape, load in cases)
     used = {one.shape for one in shapes.scenes}
-    words = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(by_mesh(shapes))} meshes"
+    words = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(set(map(mesh_name, shapes.scenes)))} meshes"
     rows = [["shape scenes", len(shapes.scenes), f"of {words}, {quantities} quantities"]]
     rows += [
         [f"  {name}", count, _size(shapes.shape[name], shapes.files[name].get(size, ""))]

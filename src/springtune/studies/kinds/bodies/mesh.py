@@ -7,16 +7,15 @@ from springtune.mesh.cells import quality
 from springtune.mesh.groups import GroupedMesh
 
 from . import stored
-from .beam_mesh import make_beam
 
 
 def make(source):
     """Mesh of a beam or a shape."""
     if "outline" in source:
-        from .shape_mesh import make_shape  # here: most studies have no shapes
+        from .task_values import make_shape  # here: most studies have no shapes
 
         return make_shape(source)
-    return make_beam(source)
+    return stored.make_beam(source)
 
 
 def run(content, attempts):

@@ -13,7 +13,6 @@ from springtune.mesh.cells import MeshError
 from springtune.mesh.sheets import free_motion
 from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
-from springtune.problem.materials import AnyMaterial
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.springs.base import DEFINITIONS
@@ -35,24 +34,26 @@ class ShapeScene:
     definition: str
     kinematics: str
 
+    @property
+    def law(self) -> str:
+        """Law at finite strain of the network: a label of the dimension ``law``, or none."""
+        return DEFINITIONS[self.definition].law if self.kinematics == "nonlinear" else ""
+
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes and materials of a study by name, scenes, the materials of parts, refinements, and mesh files by size."""
+    """Shapes of a study by name, materials of their parts, scenes, refinements, and mesh files by size.
+
+    Cases that have a reference are `referred`, and with a law at finite strain, `finite`.
+    """
 
     shape: dict[str, Shape]
-    material: dict[str, AnyMaterial]
     parts: dict[str, dict[str, str]]
     scenes: tuple[ShapeScene, ...]
     referred: tuple[tuple[str, str, str], ...]
     finite: tuple[tuple[str, str, str, str], ...]
     refined: dict[str, dict[str, float]]
     files: dict[str, dict[float, str]]
-
-    def materials_of(self, shape: str, material: str) -> dict[str, AnyMaterial]:
-        """Material of each part of a shape, that of the main part under ``""``."""
-        own = {part: self.material[name] for part, name in self.parts[shape].items()}
-        return {"": self.material[material]} | own
 
 
 def _segments(sides):
@@ -96,62 +97,43 @@ def files_of(shape, folder):
     return {one.mesh_size: str(folder / one.file) for one in sorted(shape.file or (), key=attrgetter("mesh_size"))}
 
 
-def _scenes(config):
-    """Scenes of all grids, the cases that have a reference, and those with a law at finite strain that have one."""
-    found, referred, finite = {}, {}, {}
+def expand(config, declared):
+    """Shapes of a study that has any, see `springtune.studies.config.kind.Kind`."""
+    found, referred, finite = set(), set(), set()
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
-            own = [(OWN_FILE, one.mesh_size) for one in shape.file or ()]
-            meshes = own or [(MADE, size) for size in grid.mesh_size]
-            for mesh, material, load in product(meshes, grid.material, grid.load or shape.loads):
-                if grid.reference:
-                    referred[name, material, load] = None
-                for definition, kinematics in product(grid.definition, grid.kinematics):
-                    one = ShapeScene(name, *mesh, material, load, definition, kinematics)
-                    found[one] = None
-                    if grid.finite_strain and law_of(one):
-                        finite[_finite(one)] = None
-    return found, referred, finite
-
-
-def _finite(one):
-    """Case of a scene's reference at finite strain."""
-    return one.shape, one.material, one.load, law_of(one)
-
-
-def law_of(one):
-    """Law at finite strain of a scene's network: a label of the dimension ``law``, or none."""
-    return DEFINITIONS[one.definition].law if one.kinematics == "nonlinear" else ""
-
-
-def expand(config, declared):
-    """Shapes of a study that has any, see `springtune.studies.config.kind.Kind`."""
-    found, referred, finite = _scenes(config)
-    known = {
-        "shape": [*config.shapes],
-        "mesh_type": [MADE, OWN_FILE],
-        "material": [*config.materials],
-        "definition": [*DEFINITIONS],
-        "kinematics": [*KINEMATICS],
-    }
+            meshes = [(OWN_FILE, one.mesh_size) for one in shape.file or ()] or [
+                (MADE, size) for size in grid.mesh_size
+            ]
+            axes = meshes, grid.material, grid.load or shape.loads, grid.definition, grid.kinematics
+            own = [ShapeScene(name, *mesh, *labels) for mesh, *labels in product(*axes)]
+            found.update(own)
+            referred.update(_case(one) for one in own if grid.reference)
+            finite.update((*_case(one), one.law) for one in own if grid.finite_strain and one.law)
+    known = [*config.shapes], [MADE, OWN_FILE], [*config.materials], [*DEFINITIONS], [*KINEMATICS]
 
     def order(one):
-        shape, mesh_type, material, *rest = (labels.index(getattr(one, name)) for name, labels in known.items())
+        labels = one.shape, one.mesh_type, one.material, one.definition, one.kinematics
+        shape, mesh_type, material, *rest = (names.index(label) for names, label in zip(known, labels))
         load = list(config.shapes[one.shape].loads).index(one.load)
         return shape, mesh_type, one.mesh_size, material, load, *rest
 
     scenes = sorted(found, key=order)
     return Shapes(
-        {name: shape_of_config(name, one, declared.folder) for name, one in config.shapes.items()},
-        declared.materials,
-        {name: one.parts for name, one in config.shapes.items()},
-        tuple(scenes),
-        tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
-        tuple(dict.fromkeys(key for one in scenes for key in [_finite(one)] if key in finite)),
-        {name: one.refined for name, one in config.shapes.items()},
-        {name: files_of(one, declared.folder) for name, one in config.shapes.items()},
+        shape={name: shape_of_config(name, one, declared.folder) for name, one in config.shapes.items()},
+        parts={name: one.parts for name, one in config.shapes.items()},
+        scenes=tuple(scenes),
+        referred=tuple(dict.fromkeys(case for case in map(_case, scenes) if case in referred)),
+        finite=tuple(dict.fromkeys(case for one in scenes if (case := (*_case(one), one.law)) in finite)),
+        refined={name: one.refined for name, one in config.shapes.items()},
+        files={name: files_of(one, declared.folder) for name, one in config.shapes.items()},
     )
+
+
+def _case(one):
+    """Shape, material and load of a scene."""
+    return one.shape, one.material, one.load
 
 
 MOST_SHAPE_SCENES = 100_000

@@ -9,8 +9,7 @@ from springtune.mesh.sheets import outline_of, rounds
 from springtune.problem.materials import of_parts
 from springtune.reference.shapes import solve_each
 
-from .shape_mesh import make_shape
-from .task_values import ONE_LOAD, by_key, materials_of, quantity_key, shape_of
+from .task_values import ONE_LOAD, by_key, make_shape, materials_of, quantity_key, shape_of
 
 ALONG = 24
 """Points along a side of an outline that is drawn."""

@@ -4,13 +4,16 @@ A mesh is a VTU file and a stored result with the checksum of that file, its qua
 that cannot be made has no VTU file, and its result says why.
 """
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springtune.mesh.formats import read_stored, write_mesh
+from springtune.mesh.cells import Mesh
+from springtune.mesh.formats import read_beam_mesh, read_stored, write_mesh
 from springtune.mesh.groups import GroupedMesh
+from springtune.mesh.types import MESH_TYPES
 
 from ...runs import store
 from ...runs.attempts import RefusedError
@@ -18,6 +21,21 @@ from ...runs.source import checksum, hash_of
 from ...runs.store import DamagedError
 
 # -- meshes ------------------------------------------------------------------------------------------------------------
+
+
+def make_beam(source: dict[str, Any]) -> Mesh:
+    """Mesh of a box ``length`` by ``height``: by ``mesh_type`` and ``mesh_size``, or of a ``file`` and its ``unit``."""
+    box = source["length"], source["height"]
+    if "file" in source:
+        check_unchanged(source)
+        return read_beam_mesh(source["file"], *box, source["unit"])
+    return MESH_TYPES[source["mesh_type"]](*box, source["mesh_size"])
+
+
+def check_unchanged(source: dict[str, Any]) -> None:
+    """End the job if a mesh file changed since the study was read."""
+    if hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest() != source["content"]:
+        raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
 
 
 NOTES = "notes"

@@ -7,9 +7,13 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from springtune.mesh.formats import read_shape
+from springtune.mesh.groups import GroupedMesh
 from springtune.problem.geometry import AssumptionWarning
 from springtune.problem.materials import AnyMaterial, material_of
 from springtune.problem.shapes import LoadCase, Quantity, Shape
+
+from .stored import check_unchanged
 
 UNNAMED, ONE_LOAD = "shape", "load"
 """Names of a shape and of its load in tasks."""
@@ -56,6 +60,16 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
         return _SHAPE.validate_python(own | {"loads": {ONE_LOAD: case} if case else {}})
+
+
+def make_shape(source: dict[str, Any]) -> GroupedMesh:
+    """Mesh of a shape with its groups, generated or read from its ``file``."""
+    from springtune.mesh.outlines import mesh_shape  # here: most callers mesh nothing
+
+    if "file" in source:
+        check_unchanged(source)
+        return read_shape(source["file"], source["unit"])
+    return mesh_shape(shape_of(source), source["mesh_size"], source["refined"])
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:

@@ -15,7 +15,7 @@ from ...config.kind import Kind, Stage
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
-from ..bodies.beam_plan import expected_seconds, mesh_key, mesh_parameters, mesh_source, particles
+from ..bodies.plan import expected_seconds, mesh_key, mesh_source, parameters, particles
 from .outputs import OUTPUTS
 
 
@@ -73,9 +73,9 @@ def _tasks(study):
     for labels in cells:
         definition, mesh_type, size, ratio = labels.values()
         mesh, name = _mesh_of(study, box, mesh_type, size), f"{mesh_type}_{1e3 * size:g}mm"
-        also = mesh_parameters(mesh), mesh_type_key(mesh_type), definition_key(definition)
+        also = parameters(mesh_source(mesh)), mesh_type_key(mesh_type), definition_key(definition)
         values = {"definition": definition, "poisson_ratio": ratio}
-        seconds = expected_seconds(particles(mesh), definition)
+        seconds = expected_seconds(particles(mesh.beam.length * mesh.beam.height, size), definition)
         yield Task(values, also, labels, seconds, name, file=name, shared={"mesh": mesh_source(mesh)})
 
 

@@ -5,7 +5,7 @@ from springtune.problem.status import Status
 from springtune.scene.moduli import MeshModuli
 from springtune.springs.base import DefinitionError
 
-from ..bodies.beam_mesh import make_beam
+from ..bodies.stored import make_beam
 
 
 def prepare(patch, content):

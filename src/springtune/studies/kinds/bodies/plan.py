@@ -1,9 +1,10 @@
-"""Tasks of beams, the keys of their results, and which references are interpolated."""
+"""Stages, tasks and keys of beams and shapes, and which references are interpolated."""
 
 import hashlib
 from collections import defaultdict
 from functools import cache, lru_cache
 from math import ceil, floor, log, log10
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +12,13 @@ from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem, unit_scales
 from springtune.springs.base import DEFINITIONS
 
+from ...config.kind import Stage
 from ...config.model import keeps_fields, once_a_study, shown
+from ...runs import attempts
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import hash_of
+from .outputs import DRAWING, OWN_FILE, mesh_name
 from .stored import CALIBRATION
 
 if TYPE_CHECKING:
@@ -27,13 +31,8 @@ if TYPE_CHECKING:
     Box = tuple[tuple[float, float], tuple[float, float]]
 
 
-def particles(mesh):
+def particles(area, mesh_size):
     """Approximate number of particles of a mesh."""
-    return particles_in(mesh.beam.length * mesh.beam.height, mesh.mesh_size)
-
-
-def particles_in(area, mesh_size):
-    """Approximate number of particles in an area."""
     return area / (0.866 * mesh_size**2)
 
 
@@ -46,23 +45,30 @@ def expected_seconds(particles, definition=""):
     return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHING else 1)
 
 
-def _by_mesh(items):
+def _grouped(items, key):
+    """Items by a key, in order."""
     groups = defaultdict(list)
     for item in items:
-        groups[item.mesh].append(item)
+        groups[key(item)].append(item)
     return dict(groups)
 
 
 @once_a_study
 def scenes_by_mesh(study):
     """Scenes of a study by their mesh."""
-    return _by_mesh(study.scenes)
+    return _grouped(study.scenes, attrgetter("mesh"))
 
 
 @once_a_study
 def curves_by_mesh(study):
     """Sensitivity curves of a study by their mesh."""
-    return _by_mesh(study.curves)
+    return _grouped(study.curves, attrgetter("mesh"))
+
+
+@once_a_study
+def shape_scenes_by_mesh(study):
+    """Scenes of shapes by the stem of their mesh, which differs from those of beams."""
+    return _grouped(study.shapes.scenes if study.shapes else (), shape_stem)
 
 
 # -- references that are interpolated ----------------------------------------------------------------------------------
@@ -160,16 +166,8 @@ def expected_solves(box: "Box") -> int:
 @cache
 def mesh_key(mesh):
     """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
-    return hash_of(
-        mesh_parameters(mesh),
-        stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.shape_mesh",)),
-        mesh_type_key(mesh.mesh_type),
-    )
-
-
-def mesh_parameters(mesh):
-    """Parameters that a mesh depends on."""
-    return parameters(mesh_source(mesh))
+    code = stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
+    return hash_of(parameters(mesh_source(mesh)), code, mesh_type_key(mesh.mesh_type))
 
 
 def parameters(source):
@@ -331,11 +329,8 @@ def shown_scenes(study):
 @once_a_study
 def calibrating(study):
     """Curves that calibrate each group of scenes."""
-    found = defaultdict(list)
-    for one in study.curves:
-        if (one.mesh.beam.name, one.load) == study.calibration:
-            found[calibration_name(one)].append(one)
-    return dict(found)
+    chosen = (one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration)
+    return _grouped(chosen, calibration_name)
 
 
 def calibration_name(scene):
@@ -356,3 +351,167 @@ def calibrations(study):
         members = [named(one) for one in calibrating(study)[name]]
         found[name] = Task({"members": members}, name="all", file=CALIBRATION, key=hash_of(members, code))
     return found
+
+
+# -- shapes ------------------------------------------------------------------------------------------------------------
+
+MOST_DRAWN = 1500
+"""Particles, about, of the largest mesh that is drawn where a coarser one is there."""
+
+FILE_PARTICLES = 2000.0
+"""Particles of a mesh from a file, for costs, before it is read."""
+
+WITHOUT_FINITE_STRAIN = ("reference.finite_shapes", "reference.finite_strain")
+
+
+def shape_stem(one):
+    """Stem of the files of a scene of a shape."""
+    return f"shape_{mesh_name(one)}"
+
+
+def shape_particles(study, one):
+    """Approximate number of particles of a scene's mesh."""
+    shape = study.shape(one.shape)
+    return FILE_PARTICLES if shape.file else particles(shape.area, one.mesh_size)
+
+
+@once_a_study
+def drawn_scenes(study):
+    """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
+    found = set()
+    for scenes in _grouped(study.shapes.scenes, attrgetter("shape", "load")).values():
+        few = [one for one in scenes if shape_particles(study, one) <= MOST_DRAWN]
+        size = attrgetter("mesh_size")
+        mesh = min(few, key=size) if few else max(scenes, key=size)
+        alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
+        found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
+    return found
+
+
+def shape_source(shape, file=""):
+    """Geometry of a shape, or one of its files."""
+    from .task_values import geometry  # here, as below: studies of beams read this module as well
+
+    return geometry(shape) | (file_source(file or shape.file, shape.unit) if shape.file else {})
+
+
+def shape_mesh_source(study, one):
+    """Source of the mesh of a scene."""
+    source = shape_source(study.shape(one.shape), study.shapes.files[one.shape].get(one.mesh_size, ""))
+    if "file" in source:
+        return source
+    refined = {name: share * one.mesh_size for name, share in study.shapes.refined[one.shape].items()}
+    return source | {"mesh_size": one.mesh_size, "refined": refined}
+
+
+def shape_mesh_key(study, one):
+    """Key of the mesh of a scene."""
+    code = stage_key("studies.kinds.bodies.mesh"), _reader(study.shape(one.shape))
+    return hash_of(parameters(shape_mesh_source(study, one)), *code)
+
+
+def _reader(shape):
+    """Key of the code that reads the mesh file of a shape; empty without a file."""
+    return mesh_type_key(OWN_FILE) if shape.file else ""
+
+
+def _case(study, shape, material, name):
+    """Thickness, load and materials of a scene; densities only under gravity."""
+    from .task_values import load
+
+    case, materials = study.shape(shape).loads[name], study.materials_of(shape, material)
+    weighs = any(case.gravity)
+    materials = {part: material_key(one, weighs) for part, one in materials.items()}
+    return {"thickness": study.shape(shape).thickness, "load": load(case), "materials": materials}
+
+
+def shape_reference_task(study, shape, material, name, law=""):
+    """Task of a reference of small strain, or of a law at finite strain."""
+    body = study.shape(shape)
+    task = {"shape": shape_source(body)} | _case(study, shape, material, name) | ({"law": law} if law else {})
+    without = () if law else WITHOUT_FINITE_STRAIN
+    code = stage_key("studies.kinds.bodies.shape_reference", attempts.MODULE, without=without), _reader(body)
+    return {"key": hash_of(task | {"shape": parameters(task["shape"])}, code)} | task
+
+
+def shape_scene_task(study, one):
+    """Task of a scene of a shape."""
+    code = stage_key("studies.kinds.bodies.solve", without=WITHOUT_FINITE_STRAIN), definition_key(one.definition)
+    task = _case(study, one.shape, one.material, one.load)
+    task |= {"definition": one.definition, "kinematics": one.kinematics}
+    key = hash_of(shape_mesh_key(study, one), task, code)
+    kept = DRAWING in study.outputs and one in drawn_scenes(study)
+    return {"key": key} | task | ({"keep_fields": True} if kept else {})
+
+
+# -- stages ------------------------------------------------------------------------------------------------------------
+
+
+def _mesh_task(name, source, key, particles, scenes, curves=()):
+    """Task of a mesh with the expected seconds of all that is solved on it."""
+    seconds = (1 + len(curves)) * expected_seconds(particles)
+    seconds += sum(expected_seconds(particles, scene.definition) for scene in scenes)
+    return Task(source, seconds=seconds, name=name, file=name, key=key)
+
+
+def _mesh_tasks(study):
+    curves = curves_by_mesh(study)
+    for mesh, scenes in scenes_by_mesh(study).items():
+        count, own = particles(mesh.beam.length * mesh.beam.height, mesh.mesh_size), curves.get(mesh, ())
+        yield _mesh_task(stem(mesh), mesh_source(mesh), mesh_key(mesh), count, scenes, own)
+    for name, scenes in shape_scenes_by_mesh(study).items():
+        source, key = shape_mesh_source(study, scenes[0]), shape_mesh_key(study, scenes[0])
+        yield _mesh_task(name, source, key, shape_particles(study, scenes[0]), scenes)
+
+
+def _reference_tasks(study):
+    """Tasks of references, of which those that share elements are in one job, and of interpolants."""
+    found = {}
+    for one in study.references:
+        body = one.beam, one.material, one.load
+        if "interpolant" not in reference_of(study, *body):
+            problem, key = unit_problem_of(*body), solved_reference(*body)["key"]
+            name = hash_of(problem[0], problem[2])
+            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
+        for kind in study.further_references:
+            values, key = finite_problem(one, kind), finite_key(one, kind)
+            found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
+    yield from found.values()
+    for kind, (box, problems) in interpolants(study).items():
+        key = interpolant_key(kind, box)
+        keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+        values = {"kind": kind, "box": box, "problems": keys}
+        yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
+    for one in (*study.shapes.referred, *study.shapes.finite) if study.shapes else ():
+        task = shape_reference_task(study, *one)
+        yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
+
+
+def _curve_tasks(study):
+    for mesh, curves in curves_by_mesh(study).items():
+        for task in (curve_task(study, one) for one in curves):
+            yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
+
+
+def _calibration_tasks(study):
+    return calibrations(study).values()
+
+
+def _solve_tasks(study):
+    for mesh, tasks in scene_tasks(study).items():
+        shared, name = {"beam": (mesh.beam.length, mesh.beam.height, mesh.beam.thickness)}, stem(mesh)
+        for task in tasks:
+            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
+    for name, scenes in shape_scenes_by_mesh(study).items():
+        shared = {"shape": parameters(shape_source(study.shape(scenes[0].shape)))}
+        for task in (shape_scene_task(study, one) for one in scenes):
+            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
+
+
+STAGES = (
+    Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
+    Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
+    Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh"),
+    Stage("calibrate", "studies.kinds.bodies.calibrate", _calibration_tasks, "curves"),
+    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh"),
+)
