@@ -79,7 +79,6 @@ STUDIES = {
         "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
     ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
-    "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give at most 1000"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
     "aliases of aliases": (
         "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)),
@@ -108,22 +107,14 @@ def test_a_study_at_the_limits_is_read(tmp_path):
     assert len(st.load_study(path).scenes) == 2000
 
 
-def sparse(path):
-    """A file of 61 MB that takes no room."""
-    with path.open("wb") as file:
-        file.truncate(61_000_000)
-
-
-@pytest.mark.parametrize("fault", ["missing", "a folder", "large"])
+@pytest.mark.parametrize("fault", ["No such file", "Is a directory"])
 def test_a_mesh_file_that_cannot_be_meant_is_an_error_of_the_study(tmp_path, fault):
     file = tmp_path / "own.vtu"
-    if fault == "a folder":
+    if fault == "Is a directory":
         file.mkdir()
-    elif fault == "large":
-        sparse(file)
     text = SMALL.replace("mesh_type: structured", "mesh_type: own")
     (tmp_path / "study.yaml").write_text(text + "mesh_files: {own: [{file: own.vtu, beam: a, mesh_size: 5 mm}]}\n")
-    with pytest.raises(st.StudyError, match=r"mesh_files\.own\[0\]\.file: .*own\.vtu' is (not a file|larger than)"):
+    with pytest.raises(st.StudyError, match=rf"mesh_files\.own\[0\]\.file: .*own\.vtu': {fault}.*; give"):
         st.load_study(tmp_path / "study.yaml")
 
 
@@ -294,7 +285,8 @@ def test_a_definition_and_a_mesh_type_that_return_something_else_are_refused():
 
 class TestFiles:
     def test_large_files_are_refused(self, tmp_path):
-        sparse(tmp_path / "own.vtu")
+        with (tmp_path / "own.vtu").open("wb") as file:
+            file.truncate(61_000_000)  # takes no room
         with pytest.raises(MeshError, match="61 MB, and at most 60 MB are read; write a coarser mesh, or binary VTU"):
             read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
 

@@ -165,6 +165,11 @@ class TestSwept:
         head = HEAD + grid_text(GRID) + "  two:\n"
         assert load(head, force=["1 kN", "2 kN"]).axes["force"] == (1e3, 2e3)
 
+    def test_forces_of_two_grids_on_one_beam_in_one_load_are_a_sweep(self, load):
+        head = HEAD + grid_text(GRID) + "  two:\n"
+        assert load(head, force="2 kN").axes["force"] == (1e3, 2e3)
+        assert load(head, force="2 kN", load="bending").swept == ()
+
     def test_another_beam_than_the_calibrating_one_may_have_two_forces(self, load):
         head = HEAD.replace("grids:", "definitions: {calibrated: {beam: long, load: traction}}\ngrids:")
         grid = {"beam": ["long", "short"], "definition": ["calibrated", "lattice"]}

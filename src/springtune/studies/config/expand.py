@@ -1,24 +1,21 @@
 """Expand the sections of a study into meshes, scenes and curves."""
 
-import os
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from springtune.mesh.formats import LARGEST_FILE
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from springtune.problem.parameters import SWEPT
-from springtune.safe_io.escapes import clipped
+from springtune.safe_io.inputs import fault
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from .checks import check_cells, check_files, mesh_type_names, stated_rows
+from .checks import check_cells, mesh_type_names, stated_rows
 from .combinations import combinations, read_printed
 from .fields import RANGE_DIGITS
 from .kind import Kind
@@ -28,6 +25,8 @@ from .sections import StudyConfig
 
 Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 
+FROM_THE_STUDY = "give its path relative to the study's folder"
+
 
 def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Problems) -> MeshFiles:
     """Meshes from files by (mesh type, beam's name, mesh size)."""
@@ -36,26 +35,13 @@ def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Pr
         for number, row in enumerate(rows):
             path, label = problems.folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
-            fault = file_fault(path)
-            if fault:
-                problems.add((*where, "file"), f"'{path}' {fault}")
+            if why := fault(path):
+                problems.add((*where, "file"), f"'{path}': {why}; {FROM_THE_STUDY}")
             if label in found:
                 problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")
             found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
-
-
-def file_fault(path: Path) -> str:
-    """Return why a path cannot be a mesh file, or an empty string."""
-    try:
-        if path.is_file():
-            if path.stat().st_size > LARGEST_FILE:
-                return f"is larger than {LARGEST_FILE // 1_000_000} MB, the most that is read; write a coarser mesh"
-            return "" if os.access(path, os.R_OK) else "may not be read; change its permissions"
-    except (OSError, ValueError):  # a name that no file can have
-        pass
-    return "is not a file; give its path relative to the study's folder"
 
 
 @dataclass(frozen=True)
@@ -93,14 +79,11 @@ def _ranks(config: StudyConfig) -> dict[str, dict[str, int]]:
     return {dimension: {name: rank for rank, name in enumerate(labels)} for dimension, labels in names.items()}
 
 
-def swept(config: StudyConfig) -> tuple[str, ...]:
+def swept(config: StudyConfig, references: Iterable[Reference]) -> tuple[str, ...]:
     """Parameters that are dimensions: the ones given in a grid, and a force with several values."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
-    for grid in config.grids.values():
-        forces = grid.force.values() if isinstance(grid.force, dict) else [grid.force or [], grid.pressure or []]
-        if any(len(set(values)) > 1 for values in forces):
-            found.add("force")
-    return tuple(name for name in SWEPT if name in found)
+    loaded = [(one.beam, one.material, one.load) for one in {*references}]
+    return tuple(name for name in SWEPT if name in found or (name == "force" and len({*loaded}) < len(loaded)))
 
 
 def _bodies(
@@ -117,7 +100,7 @@ def _bodies(
         found = only_isotropic(known.materials[name], "put the sheet under 'shapes'")
         own: dict[str, Any] = {"young_modulus": young_modulus, "poisson_ratio": poisson_ratio}
         own = {key: value for key, value in own.items() if value is not None}
-        # Rubber keeps the moduli of its law; `expand` refuses others.
+        # Rubber keeps the moduli of its law; `check_names` refuses others.
         return found if isinstance(found, Rubber) else replace(found, **own)
 
     @cache
@@ -139,8 +122,6 @@ def _force(pressure: float, beam: Beam) -> float:
 def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Expand grids into scenes and curves."""
     make_beam, make_material, make_mesh = _bodies(bodies, mesh_files)
-    several = "force" in swept(config)
-    forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
     for name, grid in config.grids.items():
         scenes: list[SceneSpec] = []
@@ -150,24 +131,7 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
         for one in combinations(grid):
             beam, load = make_beam(one["beam"], one.get("thickness")), one["load"]
             material = make_material(one["material"], one.get("young_modulus"), one.get("poisson_ratio"))
-            if isinstance(material, Rubber):
-                for key in ("young_modulus", "poisson_ratio"):
-                    if key in one:
-                        problems.add(
-                            ("grids", name, key),
-                            f"material '{material.name}' has a uniaxial_test, which says its moduli; take it out of "
-                            "this grid, or remove the key",
-                        )
             magnitude = _force(one["pressure"], beam) if "pressure" in one else one["force"]
-            if not several:
-                other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
-                if other != magnitude:
-                    problems.add(
-                        ("grids", name, "force"),
-                        f"{magnitude:g} N on beam '{beam.name}' of {material.name} in {load}, but grid '{other_grid}' "
-                        f"has {other:g} N; give both the same force, or both forces in a list: force is a dimension "
-                        "then",
-                    )
             mesh = make_mesh(beam, one["mesh_type"], one["mesh_size"])
             if mesh is None:
                 absent.add((one["mesh_type"], beam.name, f"{1e3 * one['mesh_size']:g} mm"))
@@ -191,35 +155,23 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
     if not calibration:
         return []
     place = calibration.beam, calibration.load
-    cells: dict[tuple[str, Material], dict[tuple[MeshSpec, Material, str, float], None]] = defaultdict(dict)
-    for one in scenes:
-        if (one.mesh.beam.name, one.load) == place:
-            cells[one.mesh.mesh_type, one.material][one.mesh, one.material, one.load, one.force] = None
+    there = [one for one in scenes if (one.mesh.beam.name, one.load) == place]
     calibrated = (one for one in scenes if one.definition == "calibrated")
     curves: list[CurveSpec] = []
     for mesh_type, material, kinematics in dict.fromkeys(
         (one.mesh.mesh_type, one.material, one.kinematics) for one in calibrated
     ):
-        found = [CurveSpec(*cell, kinematics) for cell in cells[mesh_type, material]]
+        alike = (one for one in there if one.mesh.mesh_type == mesh_type and one.material == material)
+        found = [*dict.fromkeys(CurveSpec(one.mesh, material, one.load, one.force, kinematics) for one in alike)]
         curves += found
-        where = f"beam '{place[0]}' in {place[1]} on {mesh_type} meshes of {material.name}"
+        path, where = ("definitions", "calibrated"), f"beam '{place[0]}' in {place[1]} on {mesh_type} meshes"
+        where += f" of {material.name}"
         if not found:
-            problems.add(
-                ("definitions", "calibrated"),
-                f"no grid has {where}, but scenes there are 'calibrated'; add it to a grid, or calibrate on another "
-                "beam or load",
-            )
-        for what, unit, values in (
-            ("forces", "N", {abs(curve.force) for curve in found}),
-            ("thicknesses", "mm", {1e3 * curve.mesh.beam.thickness for curve in found}),
-        ):
-            if len(values) > 1:
-                listed = clipped(", ".join(f"{value:g} {unit}" for value in sorted(values)))
-                problems.add(
-                    ("definitions", "calibrated"),
-                    f"{where} has {len(values)} {what} ({listed}), and one stiffness is calibrated; give it one value, "
-                    "or calibrate on a beam or load that is not swept",
-                )
+            what = f"no grid has {where}, but scenes there are 'calibrated'"
+            problems.add(path, f"{what}; add it to a grid, or calibrate on another beam or load")
+        elif len({(one.force, one.mesh.beam.thickness) for one in found}) > 1:
+            what = f"{where} has several forces or thicknesses, and one stiffness is calibrated"
+            problems.add(path, f"{what}; give it one value, or calibrate on a beam or load that is not swept")
     return curves
 
 
@@ -232,7 +184,12 @@ def build(
     about: dict[str, Any],
 ) -> Study:
     """Build the study with the parts of all study kinds."""
-    ranks, names = _ranks(config), swept(config)
+    # By their places: hashing a beam and a material for each of 100,000 scenes is slow.
+    loaded = {
+        (id(one.mesh.beam), id(one.material), one.load, one.force): one for grid in grids for one in grid.scenes
+    }.values()
+    references = [Reference(one.mesh.beam, one.material, one.load, one.force) for one in loaded]
+    ranks, names = _ranks(config), swept(config, references)
 
     def order(item: Item) -> tuple[Any, ...]:
         labels = item.labels | {"thickness": item.beam.thickness} if isinstance(item, MeshSpec) else item.labels(names)
@@ -244,11 +201,6 @@ def build(
     scenes = in_order(scene for grid in grids for scene in grid.scenes)
     curves = [curve for grid in grids for curve in grid.curves] + _calibrating(config, scenes, problems)
     meshes = in_order(scene.mesh for scene in scenes)
-    # By their places: hashing a beam and a material for each of 100,000 scenes is slow.
-    found = {(id(one.mesh.beam), id(one.material), one.load, one.force): one for one in scenes}
-    references = in_order(Reference(one.mesh.beam, one.material, one.load, one.force) for one in found.values())
-    check_files(meshes, scenes, problems)
-    problems.stop()
     used: dict[str, set[Any]] = {name: set() for name in (*ranks, "mesh_size", *names)}
     for labels in [mesh.labels for mesh in meshes] + [one.labels(names) for one in references]:
         for name, label in labels.items():
@@ -273,7 +225,7 @@ def build(
         meshes=meshes,
         scenes=scenes,
         curves=in_order(curves),
-        references=references,
+        references=in_order(references),
         outputs=tuple(name for name in made if name in config.outputs),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         materials=bodies.materials,

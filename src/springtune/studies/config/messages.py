@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, NoReturn, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -269,11 +269,6 @@ LARGEST_STUDY = 500_000
 MOST_VALUES = 100_000
 """Limit of values and keys, with aliases expanded."""
 
-LONGEST_TEXT = 1000
-
-DEEPEST = 20
-"""Limit of nested lists and mappings."""
-
 
 def read_study(path: str | Path) -> tuple[str, Any, Lines]:
     """Return the text, the content and the line of each key of a study."""
@@ -312,7 +307,12 @@ def read_yaml(text: str, file: str) -> tuple[Any, Lines]:
     reader = _Reader(file)
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-        return None if root is None else reader.content(root, ()), reader.lines
+        if root is None:
+            return None, {}
+        yaml.constructor.SafeConstructor().construct_document(root)  # refuses what Snakemake would, and merges `<<`
+        return reader.content(root, ()), reader.lines
+    except StudyError:
+        raise
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         line = f":{mark.line + 1}" if mark else ""
@@ -321,15 +321,14 @@ def read_yaml(text: str, file: str) -> tuple[Any, Lines]:
         lines_of_text = text.splitlines()
         if mark and mark.line < len(lines_of_text) and "\t" in lines_of_text[mark.line]:
             remedy = "write spaces in place of the tab in this line"
+        if isinstance(error, yaml.constructor.ConstructorError):
+            remedy = "take tags (!) out, put a lone = in quotes, and give '<<' an alias such as *name"
         raise StudyError(f"{file}{line}: not YAML: {problem}; {remedy}") from None
+    except ValueError as error:
+        raise StudyError(f"{file}: not YAML: a date or number cannot be read: {error}; put it in quotes") from None
     except RecursionError:
-        raise StudyError(f"{file}: {_TOO_DEEP}") from None
-
-
-_TOO_DEEP = (
-    "not a study: nested too deeply, or an alias (*name) inside of what it stands for; see config/README.md for what a "
-    "study may hold"
-)
+        why = "nested too deeply, or an alias (*name) inside of what it stands for"
+        raise StudyError(f"{file}: not a study: {why}; see config/README.md for what a study may hold") from None
 
 
 class _Reader:
@@ -339,64 +338,40 @@ class _Reader:
         self.file, self.values = file, 0
         self.lines: dict[tuple[Key, ...], int] = {}
 
-    def refuse(self, node: yaml.Node, message: str, path: tuple[Key, ...] = ()) -> NoReturn:
+    def refuse(self, node: yaml.Node, message: str, path: tuple[Key, ...] = ()) -> None:
         problems = Problems(self.file)
         problems.add(path, message, node.start_mark.line + 1)
         problems.stop()
-        raise AssertionError
 
     def content(self, node: yaml.Node, path: tuple[Key, ...]) -> Any:
         self.values += 1
-        if len(path) > DEEPEST:
-            self.refuse(node, _TOO_DEEP)
         if self.values > MOST_VALUES:
             most = f"more than {MOST_VALUES} values, aliases (*name) as what they stand for"
             self.refuse(node, f"{most}; give ranges of fewer values, or split the study into several")
-        if node.tag not in yaml.SafeLoader.yaml_constructors:
-            tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-            remedy = "remove it, or put the value in quotes"
-            self.refuse(node, f"not YAML: {show(node.value)} has the unknown tag '{tag}'; {remedy}")
-        text = self.text(node, path) if isinstance(node, yaml.ScalarNode) else ""
         if node.tag == "tag:yaml.org,2002:null":
             return None
         self.lines.setdefault(path, node.start_mark.line + 1)
+        if isinstance(node, yaml.ScalarNode):
+            return self.text(node, path)
         if isinstance(node, yaml.SequenceNode):
             return [self.content(item, (*path, number)) for number, item in enumerate(node.value)]
-        return self.mapping(node, path) if isinstance(node, yaml.MappingNode) else text
-
-    def mapping(self, node: yaml.Node, path: tuple[Key, ...]) -> dict[str, Any]:
         found: dict[str, Any] = {}
-        merged: dict[str, Any] = {}
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                self.refuse(key, "a list or mapping cannot be a key; write a name before the colon")
-            if key.tag == "tag:yaml.org,2002:merge":
-                for base in value.value if isinstance(value, yaml.SequenceNode) else [value]:
-                    inherited = self.content(base, path)
-                    if not isinstance(inherited, dict):
-                        self.refuse(key, "'<<' merges mappings only; give it an alias such as *name")
-                    merged = inherited | merged
-                continue
-            inside = *path, key.value
+        own: dict[str, int] = {}
+        for key, value in node.value:  # what is merged comes first, from elsewhere in the file
+            inside, line = (*path, key.value), key.start_mark.line + 1
             name = self.text(key, inside)
-            if name in found:
-                why = f"'{name}' is given twice, first in line {self.lines[inside]}; rename or remove one"
-                self.refuse(key, why, inside)
+            if node.start_mark.index <= key.start_mark.index < node.end_mark.index:
+                if name in own:
+                    why = f"'{name}' is given twice, first in line {own[name]}; rename or remove one"
+                    self.refuse(key, why, inside)
+                own[name] = line
             found[name] = self.content(value, inside)
-            self.lines[inside] = key.start_mark.line + 1
-        return merged | found
+            self.lines[inside] = line
+        return found
 
     def text(self, node: yaml.ScalarNode, path: tuple[Key, ...]) -> str:
-        """Text of a scalar; refuses what YAML, and so Snakemake, does not accept, and what is not one line."""
-        try:
-            yaml.constructor.SafeConstructor().construct_object(node)
-        except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
-            tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-            self.refuse(node, f"not YAML: {show(node.value)} is no {tag}; put it in quotes")
-        # The line break that ends a block is not the text's.
+        """Text of a scalar in one line; the line break that ends a block is not the text's."""
         text: str = node.value.rstrip("\n") if node.style in ("|", ">") else node.value
         if why := unseen(text):
             self.refuse(node, why, path)
-        if len(text) > LONGEST_TEXT:
-            self.refuse(node, f"{show(text)}, {len(text)} characters; give at most {LONGEST_TEXT}", path)
         return text

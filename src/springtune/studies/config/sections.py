@@ -16,9 +16,6 @@ from .fields import Named, OneOrMore, Section, default, one_of
 from .kind import Kind, kinds
 from .messages import refuse, words
 
-PLAUSIBLE = 20.0
-"""Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
-
 
 class BeamConfig(Section):
     """A rectangular sheet, its length along x."""
@@ -188,9 +185,8 @@ class StatedStiffness(Section):
     material: fields.MaterialName
     """Material."""
 
-    value: fields.Stiffness = Field(
-        description=f"Stiffness of every spring, within a factor of {PLAUSIBLE:g} of sqrt(3)/2 E t."
-    )
+    value: fields.Stiffness
+    """Stiffness of every spring."""
 
 
 class PaperConfig(Section):
@@ -289,8 +285,8 @@ class GridConfig(Section):
     down."""
 
     force: fields.BeamForces | None = None
-    """Size of the force. The load gives the sign. A single force must be the same in all grids with that beam, material
-    and load."""
+    """Size of the force. The load gives the sign. Several forces on one beam and material in one load are a dimension
+    of the dataset."""
 
     pressure: fields.Stresses | None = None
     """Instead of `force`, for both pressure loads."""

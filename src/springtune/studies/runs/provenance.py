@@ -81,9 +81,8 @@ def inputs(study: Study) -> dict[str, str]:
 
 def input_files(study: Study) -> list[Path]:
     """The study's file and all files that it names."""
-    return sorted(
-        {study.path, *study.files, *(file for kind in kinds() for file in kind.files(study.parts[kind.name]))}
-    )
+    further = (file for kind in kinds() for file in kind.files(study.parts[kind.name]))
+    return sorted({study.path, *study.files, *further})
 
 
 def library_commit(package: Path = PACKAGE) -> str:

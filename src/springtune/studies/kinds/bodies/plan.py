@@ -198,9 +198,9 @@ def _content(file, size, time):
 @cache
 def stem(mesh):
     """Stem of a mesh's files; beams of the same extent share it, whatever their labels."""
-    extent = f"{1e3 * mesh.beam.length:g}x{1e3 * mesh.beam.height:g}"
+    extent = f"{1e3 * mesh.beam.length:.12g}x{1e3 * mesh.beam.height:.12g}"
     own = f"_{mesh_source(mesh)['content'][:8]}" if mesh.file else ""
-    return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm{own}"
+    return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:.12g}mm{own}"
 
 
 def reference_of(study, beam, material, load):

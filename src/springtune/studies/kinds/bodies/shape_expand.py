@@ -15,10 +15,11 @@ from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+from springtune.safe_io.inputs import fault
 from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import FEWER, check_able, check_density, check_particles
-from ...config.expand import file_fault
+from ...config.expand import FROM_THE_STUDY
 from .outputs import MADE, OWN_FILE
 
 
@@ -160,8 +161,8 @@ def check(config, problems):
             continue
         extents = {}
         for file in files_of(shape, problems.folder).values():
-            if fault := file_fault(Path(file)):
-                problems.add((*path, "file"), f"'{file}' {fault}")
+            if why := fault(file):
+                problems.add((*path, "file"), f"'{file}': {why}; {FROM_THE_STUDY}")
             elif problems.nothing:
                 _check_file(name, shape, Path(file), path, problems, extents)
     _check_stems(config, problems)
