@@ -27,7 +27,7 @@ class Excerpt(NamedTuple):
     columns: int | None = None
 
 
-APPROACHES = "quadratic-triangles|linear-triangles|calculix-cps[38]|condensation|boundary-elements|delingette/free"
+APPROACHES = "quadratic-triangles|linear-triangles|calculix-cps[38]|condensation|delingette/free"
 APPROACHES += "|area/braced|patch/(?:free|structured)|lattice/(?:free|braced)"
 
 EXCERPTS = {
