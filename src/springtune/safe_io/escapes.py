@@ -1,4 +1,4 @@
-"""Escape foreign texts for terminals, generated programs, JSON lines, XML, RST, Markdown and matplotlib."""
+"""Escape foreign texts for terminals, generated programs, JSON lines, XML, RST and matplotlib."""
 
 import re
 
@@ -71,17 +71,6 @@ def rst(text: str) -> str:
     """
     # The escaped space is nothing; without it, a line of backslashes would be a transition.
     return r"\ " + PUNCTUATION.sub(r"\\\1", text.strip())
-
-
-def markdown(text: object) -> str:
-    r"""Return a text escaped for Markdown, also in tables.
-
-    Examples
-    --------
-    >>> print(markdown("a | b <script>"))
-    a \| b \<script\>
-    """
-    return re.sub(r"([]\\`*_[<>|#~$&])", r"\\\1", shown(text).strip())
 
 
 def no_mathematics(text: str) -> str:

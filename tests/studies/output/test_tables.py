@@ -1,4 +1,4 @@
-"""Pages made from datasets: what they print, and that nothing of one mesh stands there as if it were of all."""
+"""Tables made from datasets, and that nothing of one mesh stands there as if it were of all."""
 
 import re
 
@@ -7,35 +7,16 @@ import pytest
 import xarray as xr
 
 from springtune.problem.compare import assured
-from springtune.studies.kinds.benchmark import figures as benchmark
+from springtune.studies.kinds.benchmark import outputs as benchmark
 from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
 from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.kinds.collect import group_of
-from springtune.studies.kinds.moduli import figures as definitions
+from springtune.studies.kinds.moduli import outputs as definitions
 from springtune.studies.kinds.moduli.kind import KIND as MODULI
-from springtune.studies.kinds.stability import figures as stability
+from springtune.studies.kinds.stability import outputs as stability
 from springtune.studies.kinds.stability.kind import KIND as STABILITY
 from springtune.studies.output import page as tables_page
 from springtune.studies.output.text import decimals, number
-
-
-def cells(line):
-    return [cell.strip() for cell in line.strip("|").split("|")]
-
-
-def tables(text):
-    """Rows of every table of a page, by the heading above it: a list of dicts each."""
-    found, heading, heads = {}, "", None
-    for line in text.splitlines():
-        if line.startswith("#"):
-            heading, heads = line.strip("# "), None
-        elif line.startswith("|") and heads is None:
-            heads = cells(line)
-            found.setdefault(heading, [])
-        elif line.startswith("|") and not line.startswith(("|-", "| -")):
-            found[heading].append(dict(zip(heads, cells(line))))
-    return found
-
 
 # -- which definition --------------------------------------------------------------------------------------------------
 
@@ -75,42 +56,20 @@ def compared():
     return xr.DataTree.from_dict({"/": root, "/moduli": moduli})
 
 
-def rows_of(tree, heading="Mesh type `free`", key="definition"):
-    """Rows of a table of the page of definitions; in short, those of `area`."""
-    found = tables(definitions.decision(tree))[heading]
-    return {row[key]: row for row in found if row.get("usual choice", "`area`") == "`area`"}
+def ranges(tree, load="traction", material="steel"):
+    """Rows of the table of definitions: those of `area` on the free mesh, by mesh size."""
+    (table,) = definitions.tables(tree)
+    place = {"definition": "area", "mesh_type": "free", "material": material, "load": load}
+    return {row["mesh_size_over_height"]: row for row in table["rows"] if place.items() <= row.items()}
 
 
-def test_moduli_and_errors_of_a_row_are_of_one_mesh_size():
-    text, rows = definitions.decision(compared()), rows_of(compared())
-    wanted = {"E at 0.3": "+1.0 %", "ν at 0.3": "0.100", "traction, 0.3": "+0.5 %"}  # at 1 mm, as the errors
-    assert wanted.items() <= rows["`area`"].items()
-    assert {"E at 0.3": "+5.0 %", "traction, 0.3": "+50.0 %"}.items() <= rows["`adjoint` (5 mm)"].items()
-    assert "1 mm (a/H = 0.05)" in text and "100 x 20 mm" in text
-
-
-def test_a_definition_without_moduli_on_its_mesh_size_is_left_out():
-    tree = compared()
-    tree["moduli"]["status"].loc[{"mesh_size": 1e-3}] = 0
-    rows = rows_of(tree)
-    assert "`area` (2 mm)" in rows and "`area`" not in rows
-    assert rows["`area` (2 mm)"]["E at 0.3"] == "+2.0 %"
-
-
-def test_moduli_of_another_box_than_the_beam_are_said():
-    tree = compared()
-    tree["moduli"].attrs["patch_height"] = 0.04
-    assert "moduli are of the meshes of a 100 x 40 mm sheet" in definitions.decision(tree)
-
-
-def test_summary_gives_the_range_over_all_meshes():
-    rows = rows_of(compared(), "In short", "a/H")
-    assert list(rows) == ["to 0.05", "to 0.1", "to 0.25"]
+def test_the_table_of_definitions_gives_the_range_over_all_meshes():
+    rows = ranges(compared())
+    assert list(rows) == ["up to 0.05", "0.05 to 0.1", "above 0.1"]
     # 200x40 at 1 and 2 mm (-.25, -.5 %), 100x20 at 1 mm (.5 %); 100x20 at 2 mm; 5 mm on both.
-    assert [row["meshes"] for row in rows.values()] == ["3", "1", "2"]
-    assert rows["to 0.05"]["traction, ν = 0.3"] == "−0.5 to +0.5 %"
-    assert rows["to 0.1"]["traction, ν = 0.3"] == "+1.0 %"
-    assert rows["to 0.25"]["shear, ν = 0.5"] == "−1.2 to +2.5 %"
+    assert [row["scenes"] for row in rows.values()] == [row["solved"] for row in rows.values()] == [3, 1, 2]
+    ends = [(row["lowest_error_percent"], row["highest_error_percent"]) for row in rows.values()]
+    assert np.array(ends) == pytest.approx(np.array([(-0.5, 0.5), (1.0, 1.0), (-1.25, 2.5)]))
 
 
 @pytest.mark.parametrize("spoiled", ["load", "mesh"])
@@ -121,17 +80,16 @@ def test_a_range_never_hides_a_mesh_that_is_not_solved(spoiled):
     if spoiled == "load":
         place["load"] = "shear"
     tree["deformation_error"].loc[place], tree["status"].loc[place] = np.nan, 5
-    rows = rows_of(tree, "In short", "a/H")
-    assert "1 not solved" in rows["to 0.25"]["shear, ν = 0.3"]
-    assert ("not solved" in rows["to 0.25"]["traction, ν = 0.3"]) == (spoiled == "mesh")
+    assert ranges(tree, "shear")["above 0.1"]["solved"] == 1 < ranges(tree, "shear")["above 0.1"]["scenes"]
+    assert (ranges(tree)["above 0.1"]["solved"] == 1) == (spoiled == "mesh")
 
 
-def test_a_load_that_was_not_asked_on_all_meshes_says_on_how_many():
+def test_a_range_counts_the_meshes_that_were_asked_for():
     tree = compared()
     place = {"beam": "200x40", "mesh_type": "free", "load": "bending", "definition": "area"}
     tree["deformation_error"].loc[place], tree["status"].loc[place] = np.nan, 0
-    rows = rows_of(tree, "In short", "a/H")
-    assert rows["to 0.05"]["bending, ν = 0.3"] == "+0.5 % (1 of 3)"
+    row = ranges(tree, "bending")["up to 0.05"]
+    assert row["scenes"] == row["solved"] == 1 and row["lowest_error_percent"] == pytest.approx(0.5)
 
 
 # -- the benchmark -----------------------------------------------------------------------------------------------------
@@ -150,13 +108,14 @@ def timed():
     return xr.DataTree.from_dict({"/benchmark": data})
 
 
-def test_the_page_of_the_benchmark_has_numbers_and_holes():
-    text = benchmark.page(timed())
-    assert "### traction: what has no numbers\n\n- `slow` (1 mm): not run\n- `slow` (2 mm): no memory\n" in text
-    found = tables(text)
-    (row,) = found["traction: approaches on one mesh size"]
-    assert (row["at 1 mm"], row["error"], row["time"]) == ("`steady`", "+0.02 %", "80 ms")
-    assert found["Explicit steps"][0]["float32, threads: 2"] == "200"
+def test_the_tables_of_the_benchmark_have_numbers_and_holes():
+    cases, steps = (table["rows"] for table in benchmark.tables(timed()))
+    assert len(cases) == 8 and len(steps) == 16
+    steady = {"approach": "steady", "status": "solved", "message": "", "mesh_size_mm": 1.0, "time_ms": 80.0}
+    assert steady.items() <= cases[0].items() and cases[0]["error_percent"] == pytest.approx(0.02)
+    holes = {row["mesh_size_mm"]: (row["approach"], row["message"]) for row in cases if row["status"] == "failed"}
+    assert holes == {1.0: ("slow", "not run"), 2.0: ("slow", "no memory")}
+    assert steps[0]["million_springs_a_second"] == pytest.approx(200)
 
 
 @pytest.mark.parametrize(
@@ -193,20 +152,22 @@ def stressed():
     return xr.DataTree.from_dict({"/stability": strains})
 
 
-def test_page_tells_flutter_from_buckling():
-    text = stability.page(stressed())
-    assert "| `area` | unstable (2) | solved |" in text
-    assert "| `area` | solved | unstable (flutter) |" in text
+def test_the_table_of_strains_tells_flutter_from_buckling():
+    ((rows,),) = ([table["rows"]] for table in stability.tables(stressed()))
+    area = {(row["strain_load"], row["strain"]): row for row in rows if row["definition"] == "area"}
+    assert area["axial", -0.1]["negative_pivots"] == 2 and area["axial", 0.1]["negative_pivots"] == 0
+    assert "flutter" in area["follower-pressure", 0.1]["strain_message"]
 
 
-def test_page_marks_buckling_loads_where_nothing_bifurcates():
+def test_the_table_of_buckling_loads_says_where_nothing_bifurcates():
     axes = {"definition": ["lattice"], "rows": [10, 20], "experiment": ["buckling"]}
     data = xr.Dataset(
         {"buckling_load": (("definition", "rows"), [[105.3, 99.9]]), "euler_load": ("definition", [100.0]),
          "buckling_message": (("definition", "rows"), [["", "nothing bifurcates: why"]])}, axes,
     )  # fmt: skip
-    text = stability.page(xr.DataTree.from_dict({"/stability": data}))
-    assert "| `lattice` | +5.3 % | −0.1 %* |" in text and "\n\\* nothing bifurcates: why\n" in text
+    (table,) = stability.tables(xr.DataTree.from_dict({"/stability": data}))
+    assert [row["buckling_message"] for row in table["rows"]] == ["", "nothing bifurcates: why"]
+    assert [row["buckling_load_N"] / row["euler_load_N"] for row in table["rows"]] == pytest.approx([1.053, 0.999])
 
 
 # -- the page of all tables --------------------------------------------------------------------------------------------

@@ -47,8 +47,6 @@ class Output:
         Name of the job that makes it, by default its own; outputs may share a job.
     tables : callable, optional
         From a study to the file names of its tables.
-    texts : dict of str to str
-        Further tables by the names of their files: ``"module:function"`` of a tree, which returns the text.
     write : str
         ``"module:function"`` of a tree and a folder, which writes the tables and files and returns their names.
     into : str
@@ -70,7 +68,6 @@ class Output:
     plot: str = ""
     job: str = ""
     tables: Callable[[Study], Iterable[str]] = lambda study: []
-    texts: dict[str, str] = field(default_factory=dict)
     write: str = ""
     into: str = "tables"
     page: bool = False

@@ -32,9 +32,6 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
                 from . import page  # here: few jobs write the page
 
                 made += [into / name for name in page.write(tree, into)]
-            for name, text in output.texts.items():
-                atomic.write_text(into / name, imported(text)(tree))
-                made.append(into / name)
             if output.write:
                 made += [into / name for name in imported(output.write)(tree, into)]
     return made

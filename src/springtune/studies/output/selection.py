@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -153,6 +154,20 @@ def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> li
         dimensions = [str(one) for one in data[name].dims]
         columns[name] = data[name].values[tuple(places[one] for one in dimensions)].tolist()
     return [dict(zip(columns, row)) for row in zip(*columns.values())]
+
+
+def listed(
+    data: xr.Dataset,
+    present: xr.DataArray,
+    names: Collection[str],
+    scaled: Mapping[str, tuple[str, float]] = MappingProxyType({}),
+) -> list[dict[str, Any]]:
+    """Rows of the present cells: labels and variables by name, and variables by column times a factor."""
+    variables = [name for name in (*names, *(name for name, _ in scaled.values())) if name in data.variables]
+    return [
+        {name: one[name] for name in names} | {head: factor * one[name] for head, (name, factor) in scaled.items()}
+        for one in records(data, present, variables)
+    ]
 
 
 def _listed(labels: Iterable[object]) -> str:

@@ -1,4 +1,4 @@
-"""Texts of numbers, labels and tables: for a terminal, CSV files and Markdown."""
+"""Texts of numbers, labels and tables: for a terminal and CSV files."""
 
 import json
 import math
@@ -111,23 +111,6 @@ def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
     import pandas as pd  # here: a plan does without it
 
     return pd.DataFrame(rows).to_csv(index=False, float_format="%.8g", lineterminator="\n")
-
-
-def markdown_section(title: str, *said: str) -> list[str]:
-    """Markdown lines: the head of a section, and paragraphs."""
-    return [f"### {title}", "", *(line for text in said for line in (text, ""))]
-
-
-def markdown_table(heads: list[str], rows: Iterable[list[str]], left: int = 1) -> list[str]:
-    """Markdown lines: the first columns left, others right."""
-    rule = ["---"] * left + ["---:"] * (len(heads) - left)
-    return [f"| {' | '.join(line)} |" for line in (heads, rule, *rows)]
-
-
-def cell_number(value: SupportsFloat, form: str = ".3g", scale: float = 1.0, unit: str = "") -> str:
-    """Format a number of a table; empty if missing."""
-    number = scale * float(value)
-    return "" if math.isnan(number) else f"{number:{form}}{unit}".replace("-", "−")
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:

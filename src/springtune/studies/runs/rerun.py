@@ -46,7 +46,7 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
 def output_files(output: "Output", study: "Study") -> list[str]:
     """Files of an output; for the page, all tables as CSV and the page itself."""
     figures = [f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS]
-    names = [*output.tables(study), *output.texts]
+    names = [*output.tables(study)]
     if output.page:
         names = [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
     return figures + [f"{output.into}/{name}" for name in names]
@@ -84,7 +84,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
     used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
-        used += filter(None, (name.partition(":")[0] for name in (one.module, one.write, *one.texts.values())))
+        used += filter(None, (name.partition(":")[0] for name in (one.module, one.write)))
         if one.page:
             used += ["studies.output.page", *modules("tables")]
             templates.append(checksum(PACKAGE / "studies/output/page.html"))

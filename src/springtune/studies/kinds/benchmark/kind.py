@@ -184,4 +184,5 @@ KIND = Kind(
     },
     stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
     outputs=OUTPUTS,
+    tables=lambda study: ["benchmark", "explicit_steps"] if study.parts["benchmark"] else [],
 )

@@ -1,12 +1,11 @@
-"""Figures and the page of the benchmark, and what the page to browse shows of it."""
-
-from collections.abc import Sequence
+"""Figures and tables of the benchmark, and what the page to browse shows of it."""
 
 from ...config.kind import Output
 from ...output.browse import Plot, View
+from . import PARTS
 
 
-def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
+def figures(scenes):
     """Figures of the benchmark, by stem."""
     return {f"benchmark_{scene}": {"scene": scene} for scene in scenes}
 
@@ -14,10 +13,9 @@ def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
 OUTPUTS = (
     Output(
         "benchmark",
-        "run time against error, with a page",
+        "run time against error",
         figures=lambda study: figures(study.axes.get("scene", ())),
         plot="studies.kinds.benchmark.figures:benchmark",
-        texts={"speed.md": "studies.kinds.benchmark.figures:page"},
         shows="a benchmark",
     ),
 )
@@ -36,4 +34,34 @@ VIEWS = (
             Plot("springs a second of explicit steps", "spring_updates", "mesh_size", "thread_count", log="x"),
         ),
     ),
-)  # fmt: skip
+)
+
+CASE_COLUMNS = {
+    "mesh_size_mm": ("mesh_size", 1e3),
+    "error_percent": ("error", 100),
+    "assured_error_percent": ("assured_error", 100),
+    "time_ms": ("seconds", 1e3),
+} | {f"{part}_ms": (f"{part}_seconds", 1e3) for part in PARTS}
+"""Columns of the table: variable, and the factor on it."""
+
+STEP_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "million_springs_a_second": ("spring_updates", 1e-6)}
+
+
+def tables(tree):
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
+    from ...output.dataset import STATUS  # here, since a plan does without xarray
+    from ...output.selection import listed
+
+    if "benchmark" not in tree:
+        return []
+    data = tree["benchmark"].to_dataset()
+    asked = (data.status != 0).transpose("scene", "mesh_size", "approach")
+    cases = listed(data, asked, ("scene", "approach", "status", "message"), CASE_COLUMNS)
+    cases = [row | {"status": STATUS[row["status"]]} for row in cases]
+    steps = listed(data, data.spring_updates.notnull(), ("precision", "thread_count"), STEP_COLUMNS)
+    note = "Error, and time from nothing to the displacement with its parts: medians of warm runs."
+    about = "Nonlinear springs that explicit steps advance in a second."
+    return [
+        {"stem": "benchmark", "title": "Run time against error", "note": note, "rows": cases},
+        {"stem": "explicit_steps", "title": "Explicit steps", "note": about, "rows": steps},
+    ]

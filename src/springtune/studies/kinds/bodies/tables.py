@@ -9,8 +9,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head
-from ...output.selection import cells, labels_of, of_own_law, own_laws, records
-from ...output.tables import listed
+from ...output.selection import cells, labels_of, listed, of_own_law, own_laws, records
 from ...output.text import decimals, number
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE, stem
 

@@ -1,22 +1,16 @@
 """Figures and table of runs in engines, and what the page to browse shows of them."""
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
-
 from ...config.kind import Output
 from ...output.browse import Plot, View
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-
-def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dict[str, object]]:
+def figures(scenes, curves):
     """Figures by stem: of scenes that were run, and of those with curves."""
     shown = {"errors": scenes, "maps": scenes, "curves": curves}
     return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
 
 
-def _scenes(runs: Iterable[Any]) -> list[list[object]]:
+def _scenes(runs):
     return [[run.labels["scene"] for run in runs if run.of_curve is curves] for curves in (False, True)]
 
 
@@ -68,9 +62,9 @@ ENGINE_COLUMNS = {
 """Columns of the table: variable, and the factor on it."""
 
 
-def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.tables import listed  # here, since a plan does without xarray
+    from ...output.selection import listed  # here, since a plan does without xarray
     from . import RUN_ENDS
 
     if "engines" not in tree:

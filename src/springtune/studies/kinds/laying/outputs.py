@@ -1,13 +1,7 @@
 """Figure and table of laid strips, and what the page to browse shows of them."""
 
-from typing import TYPE_CHECKING, Any
-
 from ...config.kind import Output
 from ...output.browse import Plot, View
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 OUTPUTS = (
     Output(
@@ -50,9 +44,9 @@ LAYING_COLUMNS = {
 """Columns of the table: variable, and the factor on it."""
 
 
-def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.tables import listed  # here, since a plan does without xarray
+    from ...output.selection import listed  # here, since a plan does without xarray
 
     if "laying" not in tree:
         return []

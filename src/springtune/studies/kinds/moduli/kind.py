@@ -128,4 +128,5 @@ KIND = Kind(
     attributes=_attributes,
     stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),
     outputs=OUTPUTS,
+    tables=lambda study: ["definitions"] if study.parts["moduli"] and study.scenes else [],
 )

@@ -1,28 +1,22 @@
-"""Figures and tables that compare definitions, and what the page to browse shows of their moduli."""
-
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+"""Figures and table that compare definitions, and what the page to browse shows of their moduli."""
 
 from ...config.kind import Output
 from ...output.browse import Plot, View
 
-if TYPE_CHECKING:
-    from ...config.model import Study
 
-
-def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, dict[str, object]]:
+def figures(loads, mesh_types):
     """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type, of the scenes of beams."""
-    found: dict[str, dict[str, object]] = {"definitions_moduli": {}}
+    found = {"definitions_moduli": {}}
     found |= {f"definitions_size_{load}": {"load": load} for load in loads}
     return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
 
 
-def _figures(study: "Study") -> dict[str, dict[str, object]]:
+def _figures(study):
     loads = dict.fromkeys(scene.load for scene in study.scenes)
     return figures(loads, dict.fromkeys(scene.mesh.mesh_type for scene in study.scenes))
 
 
-def _lack(study: "Study") -> str:
+def _lack(study):
     return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
 
 
@@ -32,7 +26,6 @@ OUTPUTS = (
         "comparison of definitions",
         figures=_figures,
         plot="studies.kinds.moduli.figures:definitions",
-        texts={"which_definition.md": "studies.kinds.moduli.figures:decision"},
         lack=_lack,
     ),
 )
@@ -51,3 +44,42 @@ VIEWS = (
         ),
     ),
 )
+
+COARSENESS = {0.05: "up to 0.05", 0.1: "0.05 to 0.1", float("inf"): "above 0.1"}
+"""Largest mesh sizes over the height of the beam [1] of fine, middle and coarse meshes, and their texts."""
+
+NOTE = (
+    "Lowest and highest deformation error over beams and mesh sizes. Beyond small strain a reference does not apply, "
+    "and the error is not the network's alone."
+)
+
+
+def tables(tree):
+    """Table of the page: the range of each definition's errors by mesh type, material, load and mesh size."""
+    import pandas as pd  # here, since a plan does without it and xarray
+
+    from ...output.dataset import most_requested
+    from ...output.selection import unswept
+
+    if "moduli" not in tree or "deformation_error" not in tree:
+        return []
+    root = unswept(tree.to_dataset())
+    root = root.sel(kinematics=most_requested(root, "kinematics"))
+    place = ["definition", "mesh_type", "material", "load"]
+    cells = root[["deformation_error", "status", "reference_applies"]].assign(ratio=root.mesh_size / root.beam_height)
+    frame = cells.to_dataframe([*place, "beam", "mesh_size"]).reset_index()
+    frame = frame[frame.status != 0]
+    ends = [0.0, *(end * (1 + 1e-9) for end in COARSENESS)]
+    frame["mesh_size_over_height"] = pd.cut(frame.ratio, ends, labels=[*COARSENESS.values()]).astype(str)
+    frame["solved"] = frame.status == 1
+    frame["beyond"] = frame.solved & (frame.reference_applies == 0)
+    frame["error"] = 100 * frame.deformation_error.where(frame.solved)
+    ranges = frame.groupby([*place, "mesh_size_over_height"], sort=False).agg(
+        scenes=("solved", "size"),
+        solved=("solved", "sum"),
+        beyond_small_strain=("beyond", "sum"),
+        lowest_error_percent=("error", "min"),
+        highest_error_percent=("error", "max"),
+    )
+    rows = ranges.reset_index().to_dict("records")
+    return [{"stem": "definitions", "title": "Definitions compared", "note": NOTE, "rows": rows}]

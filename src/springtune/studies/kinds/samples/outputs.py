@@ -1,15 +1,8 @@
 """Figures and table of samples, and what the page to browse shows of them."""
 
-from typing import TYPE_CHECKING, Any
-
 from ...config.kind import Output, stem
 from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from ...config.model import Study
 
 QUANTITIES = {
     "displacement": "displacement of the network",
@@ -19,14 +12,14 @@ QUANTITIES = {
 """Quantities that have indices."""
 
 
-def _lack(study: "Study") -> str:
+def _lack(study):
     sample = study.parts["samples"]
     if sample and sample.design != SOBOL_INDICES:
         return f"shows Sobol indices, which a design '{sample.design}' has not; give design: {SOBOL_INDICES}"
     return ""
 
 
-def _figures(study: "Study") -> dict[str, dict[str, str]]:
+def _figures(study):
     sample = study.parts["samples"]
     return {stem("sobol", {"load": load}): {"load": load} for load in sample.loads} if sample else {}
 
@@ -74,7 +67,7 @@ VIEWS = (
 )  # fmt: skip
 
 
-def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
     if "sobol" not in tree:
         return []

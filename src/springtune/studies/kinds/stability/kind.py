@@ -15,7 +15,7 @@ from ...config.kind import Kind, Stage
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import AXES, EXPERIMENTS, ONCE
-from .outputs import OUTPUTS
+from .outputs import OUTPUTS, STABILITY_TABLES
 
 ExperimentName = Annotated[str, *one_of("experiment", EXPERIMENTS)]
 
@@ -76,6 +76,11 @@ def _expand(config, declared):
     names = [name for name in EXPERIMENTS if name in section.experiment]
     pairs = [(name, one) for name in names for one in section.definition[: 1 if name in ONCE else None]]
     return {pair: shared | dict(zip(("name", "definition"), pair)) for pair in pairs}
+
+
+def _tables(study):
+    asked = {name for name, _ in study.parts["stability"]}
+    return [f"stability_{name}" for name in STABILITY_TABLES if name in asked]
 
 
 def _axes(experiments):
@@ -206,4 +211,5 @@ KIND = Kind(
     sparse=True,
     stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
     outputs=OUTPUTS,
+    tables=_tables,
 )
