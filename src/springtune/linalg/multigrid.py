@@ -1,6 +1,8 @@
 """Solves of large networks: conjugate gradients with multigrid on regular grids as preconditioner."""
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -8,6 +10,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
+from . import kernels
+from .blocks import CHUNKS, Blocks, Chunks, chunked, dense, row_pointers
 from .factors import Factor, SingularError
 
 RESIDUAL = 1e-11
@@ -40,6 +44,9 @@ IN_LINE = 1e-14
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
+NOWHERE = np.empty(0, np.int64), np.empty((0, 2))
+"""No rows, and nothing that their diagonal gets besides."""
+
 
 class NotPositiveError(SingularError):
     """Conjugate gradients did not converge."""
@@ -49,12 +56,22 @@ class IndefiniteError(NotPositiveError):
     """Conjugate gradients met a direction without stiffness."""
 
 
-class _Level(NamedTuple):
-    """A matrix, and the step from the next coarser grid to its unknowns and back, in single precision."""
+class Grid(NamedTuple):
+    """Cell of a regular grid that each point of a finer one is in, and its place within, from 0 to 1."""
 
-    matrix: csr_array
-    prolong: csr_array
-    restrict: csr_array
+    cells: np.ndarray
+    at: np.ndarray
+    shape: tuple[int, int]
+
+
+class Level(NamedTuple):
+    """A matrix in single precision with its smoother, and the step to the next coarser grid."""
+
+    chunks: Chunks
+    inverse: np.ndarray
+    added: tuple[np.ndarray, np.ndarray]
+    grid: Grid
+    room: tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Multigrid:
@@ -63,27 +80,32 @@ class Multigrid:
     It replaces a factor, see `springtune.linalg.factors.Factor`. Node displacements are interpolated bilinearly to
     the particles and from grid to grid, each twice as wide, so rigid motions and even strains are exact. Coarse
     matrices are Galerkin's; a cycle takes one Gauss-Seidel sweep down and one up, in single precision, enough to
-    precondition. Time and memory are proportional to the unknowns n; a factorization's grow as n^(3/2) and n log n.
+    precondition. Between chunks of rows sweeps are Jacobi's, with half the couplings' size on the diagonal, so the
+    preconditioner stays positive definite (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864,
+    2011). Time and memory are proportional to the unknowns n; a factorization's grow as n^(3/2) and n log n.
     Method: J. Xu, The auxiliary space method and optimal multigrid preconditioning techniques for unstructured grids,
     Computing 56:215, 1996.
 
-    `matrix` is symmetric; `points` (n_points, 2) in m; `places` (unknowns,) is twice the particle's number, plus 1
-    for y. `name` is ``"multigrid"``, or that of the factor that took over.
+    `matrix` has a row a point, `points` (n_points, 2) are in m, and `held` (n_points, 2) marks what cannot move.
+    `besides` (2 n_points, 2 n_points), if any, is added to it in products alone. `name` is ``"multigrid"``, or that
+    of the factor that took over.
     """
 
     def __init__(
         self,
-        matrix: csr_array,
+        matrix: Blocks,
         points: np.ndarray,
-        places: np.ndarray,
+        held: np.ndarray,
         otherwise: Callable[[], Factor] | None = None,
         like: "Multigrid | None" = None,
+        besides: csr_array | None = None,
     ) -> None:
-        self._matrix, self._otherwise, self._points, self._places = matrix, otherwise, points, places
+        self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
+        self._places = np.flatnonzero(~held)
         self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
-        self._levels: list[_Level] = []
+        self._levels: list[Level] = []
         self._coarsest: Any = None
         if like is None or like._coarsest is None:
             self._lay_grids()
@@ -94,31 +116,25 @@ class Multigrid:
         """Levels and the factor of the coarsest one, of the matrix itself."""
         self._borrowed, self._levels, self._coarsest = False, [], None
         try:
-            self._coarsest = self._coarsened(self._points, self._places)
+            self._coarsest = self._coarsened()
         except LinAlgError:  # then the matrix is not positive definite either
             self._levels = []
 
-    def _coarsened(self, points: np.ndarray, places: np.ndarray) -> Any:
-        """Levels down to the coarsest one, whose dense factor is returned."""
-        matrix = self._matrix
-        spacing = COARSENING * np.sqrt(np.ptp(points, axis=0).prod() / len(points))
-        while matrix.shape[0] > COARSEST and len(self._levels) < MOST_LEVELS:
-            # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
-            # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
-            if not matrix.diagonal().min() > 0:
-                raise LinAlgError("a diagonal that is not positive")
-            prolong, points = bilinear(points, places, spacing)
-            # Of a node that moves nothing there is no equation.
-            moving = np.bincount(prolong.indices, minlength=prolong.shape[1]) > 0
-            places = np.flatnonzero(moving)
-            if not moving.all():
-                prolong = prolong[:, places]
-            restrict = csr_array(prolong.T)
-            coarse = restrict @ (matrix @ prolong)
-            single = csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
-            self._levels.append(_Level(single, prolong, restrict))
-            matrix, spacing = coarse, 2.0 * spacing
-        return cho_factor(matrix.toarray())
+    def _coarsened(self) -> tuple[np.ndarray, Any]:
+        """Lay levels down to the coarsest one, whose unknowns and dense factor are returned."""
+        matrix, size = self._matrix, len(self._places)
+        # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
+        # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
+        if not (matrix.diagonal[:, ::2].ravel()[self._places] > 0).all():
+            raise LinAlgError("a diagonal that is not positive")
+        grid = first_grid(self._points, COARSENING)
+        while size > COARSEST and len(self._levels) < MOST_LEVELS:
+            coarse = galerkin(matrix, grid)
+            self._levels.append(_level(matrix, grid))
+            matrix, grid = coarse, next_grid(grid.shape)
+            size = np.count_nonzero(matrix.diagonal[:, ::2])
+        places = np.flatnonzero(matrix.diagonal[:, ::2])
+        return places, cho_factor(dense(matrix)[np.ix_(places, places)])
 
     def _give_up(self, error: NotPositiveError) -> Factor:
         """The factor that takes over."""
@@ -129,38 +145,57 @@ class Multigrid:
         self.name = self._direct.name
         return self._direct
 
-    def _precondition(self, right: np.ndarray) -> np.ndarray:
-        """Apply a multigrid cycle to a right-hand side."""
-        size = np.linalg.norm(right) or 1.0
-        single = np.multiply(right, 1.0 / size, out=np.empty(len(right), dtype=np.float32), casting="same_kind")
-        return np.multiply(self._cycle(0, single), size, dtype=float)
-
-    def _cycle(self, depth: int, right: np.ndarray) -> np.ndarray:
-        from pyamg.relaxation.relaxation import gauss_seidel
-
+    def _cycle(self, depth: int, right: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return what a multigrid cycle makes of a right-hand side, in room that the next one uses again; their product."""
         if depth == len(self._levels):
-            return cho_solve(self._coarsest, right.astype(float), check_finite=False).astype(np.float32)
-        matrix, prolong, restrict = self._levels[depth]
-        solution = np.zeros_like(right)
-        gauss_seidel(matrix, solution, right)
-        missing = matrix @ solution
-        np.subtract(right, missing, out=missing)
-        solution += prolong @ self._cycle(depth + 1, restrict @ missing)
-        gauss_seidel(matrix, solution, right, sweep="backward")
-        return solution
+            places, factor = self._coarsest
+            solution = np.zeros(right.shape, dtype=np.float32)
+            solution.ravel()[places] = cho_solve(factor, right.ravel()[places].astype(float), check_finite=False)
+            return solution, float(np.vdot(solution, right))
+        chunks, inverse, added, grid, (x, excess, nodes) = self._levels[depth]
+        starts, height, sweep = chunks.starts, grid.shape[1], chunks[:4]
+        work = np.empty(len(starts) - 1)
+        run(kernels.sweep_down, *sweep, inverse, right, x, excess)
+        kernels.couple(*chunks.between, *added, x, excess)
+        run(kernels.restrict, starts, grid.cells, grid.at, height, excess, nodes)
+        coarse, _ = self._cycle(depth + 1, nodes[0] if len(nodes) == 1 else nodes.sum(axis=0))
+        run(kernels.prolong, starts, grid.cells, grid.at, height, coarse, x, excess)
+        kernels.couple(*chunks.between, *added, x, excess)
+        run(kernels.sweep_up, *sweep, inverse, right, x, excess, work)
+        return x, float(work.sum())
 
     def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:
         """Solve for a right-hand side (unknowns,), to a residual relative to it."""
         if self._direct is None:
             try:
-                return self._gradients(np.array(right, dtype=float), tolerance)
+                field = np.zeros(self._points.shape)
+                field.ravel()[self._places] = right
+                return self._gradients(field, tolerance).ravel()[self._places]
             except NotPositiveError as error:
                 self._give_up(error)
         assert self._direct is not None
         return self._direct.solve(right)
 
+    @cached_property
+    def _product(self) -> Chunks:
+        return chunked(self._matrix)
+
+    def _multiply(
+        self, better: np.ndarray, scale: float, keep: float, direction: np.ndarray, forces: np.ndarray
+    ) -> float:
+        """Set the next direction and its forces, and return their product, see `kernels.multiply`."""
+        chunks = self._product
+        work = np.empty(len(chunks.starts) - 1)
+        run(kernels.multiply, *chunks[:4], self._matrix.diagonal, better, scale, keep, direction, forces, work)
+        total = float(work.sum()) + kernels.couple(*chunks.between, *NOWHERE, direction, forces)
+        if self._besides is not None:
+            more = (self._besides @ direction.ravel()).reshape(forces.shape)
+            forces += more
+            total += float(np.vdot(direction, more))
+        return total
+
     def _gradients(self, missing: np.ndarray, tolerance: float) -> np.ndarray:
-        """Solve by conjugate gradients.
+        """Solve by conjugate gradients; `missing` (n_points, 2) is used up.
 
         The first solve adds a random residual: if it vanishes too and all stiffnesses met are positive, the matrix
         counts as positive definite. A direction of negative stiffness never loses residual. The random part is ``A
@@ -170,46 +205,52 @@ class Multigrid:
         particles here, and for parts without supports by the network. A part that turns about one particle, or hangs
         on a spring or two, counts as solved.
         """
-        solution, scale = np.zeros(len(missing)), np.linalg.norm(missing)
-        if scale == 0.0:
+        solution, size = np.zeros(missing.shape), float(np.linalg.norm(missing))
+        if size == 0.0:
             return solution
-        if self._coarsest is None:
-            raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
         proves = not self._certain and tolerance <= CERTAIN
         if proves:
             self._check_particles()
-            random = np.random.default_rng(0).standard_normal(len(missing))
-            solution = self._precondition(scale / np.linalg.norm(random) * random)
-            missing -= self._matrix @ solution
-        better = self._precondition(missing)
-        direction, weight = better.copy(), missing @ better
+        if self._coarsest is None:
+            raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
+        scale, forces = 1.0 / size, np.zeros(missing.shape)
+        right = np.zeros(missing.shape, dtype=np.float32)
+        if proves:
+            random = np.random.default_rng(0).standard_normal(len(self._places))
+            right.ravel()[self._places] = random / np.linalg.norm(random)
+            self._multiply(self._cycle(0, right)[0], size, 0.0, solution, forces)
+            missing -= forces
+        np.multiply(missing, scale, out=right, casting="same_kind")
+        direction, keep = np.zeros(missing.shape), 0.0
+        better, weight = self._cycle(0, right)
+        starts = self._product.starts
+        squares = np.empty(len(starts) - 1)
         for count in range(MAX_CG_ITERATIONS):
             if self._borrowed and count == MOST_BORROWED:
                 self._lay_grids()
-                return solution + self._gradients(missing, float(tolerance * scale / np.linalg.norm(missing)))
-            forces = self._matrix @ direction
-            stiffness = direction @ forces
+                return solution + self._gradients(missing, tolerance * size / float(np.linalg.norm(missing)))
+            # The weight is in units of the scaled residual, as the preconditioner is linear.
+            stiffness = self._multiply(better, size, keep, direction, forces)
             if not stiffness > 0 or not weight > 0:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
-            length = weight / stiffness
-            forces *= length
-            missing -= forces
-            solution += np.multiply(direction, length, out=forces)
-            if np.linalg.norm(missing) <= tolerance * scale:
+            length = weight * size * size / stiffness
+            run(kernels.advance, starts, length, direction, forces, solution, missing, scale, right, squares)
+            if squares.sum() ** 0.5 <= tolerance * size:
                 self._certain |= proves
                 return solution
-            better = self._precondition(missing)
-            weight, before = missing @ better, weight
-            direction *= weight / before
-            direction += better
+            before = weight
+            better, weight = self._cycle(0, right)
+            keep = weight / before
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
 
     def _check_particles(self) -> None:
         """Refuse a matrix with a particle that moves without stiffness: all its springs are in one line."""
-        stiffness, coupling = self._matrix.diagonal(), self._matrix.diagonal(1)
-        x = np.flatnonzero(np.diff(self._places // 2) == 0)  # of particles that are free along y, too
-        both = stiffness[x] * stiffness[x + 1]
-        if not stiffness.all() or (abs(both - coupling[x] ** 2) <= IN_LINE * abs(both)).any():
+        xx, xy, yy = self._matrix.diagonal.T
+        free = np.zeros(self._points.shape, dtype=bool)
+        free.ravel()[self._places] = True
+        both, one = free.all(axis=1), free.any(axis=1)
+        product, alone = (xx * yy)[both], np.where(free[:, 0], xx, yy)[one]
+        if not alone.all() or (abs(product - xy[both] ** 2) <= IN_LINE * abs(product)).any():
             raise SingularError("a particle is free to move: its springs, if any, are in one line")
 
     def step(self, right: np.ndarray) -> np.ndarray:
@@ -229,33 +270,90 @@ class Multigrid:
         """
         if not self._certain and self._direct is None:
             try:
-                self.solve(np.random.default_rng(1).standard_normal(self._matrix.shape[0]), CERTAIN)
+                self.solve(np.random.default_rng(1).standard_normal(len(self._places)), CERTAIN)
             except IndefiniteError:
                 return 1
         return 0 if self._direct is None else self._direct.negative_pivots
 
 
-def bilinear(points: np.ndarray, places: np.ndarray, spacing: float) -> tuple[csr_array, np.ndarray]:
-    """Return the bilinear interpolation from a regular grid of about `spacing` [m], and its nodes.
+THREADS = min(CHUNKS, int(os.environ.get("OMP_NUM_THREADS") or 0) or len(os.sched_getaffinity(0)))
+_pool = ThreadPoolExecutor(max(1, THREADS - 1))
 
-    `points` (n_points, 2) [m]; `places` (unknowns,) is twice the particle's number, plus 1 for y. The matrix is
-    (unknowns, 2 n_nodes), x and y of each node in turn; nodes (n_nodes, 2) [m] have particles near by.
-    """
+
+def run(kernel: Callable[..., None], starts: np.ndarray, *arguments: Any) -> None:
+    """Run a kernel on all chunks of rows, by several threads if there are several."""
+    chunks = len(starts) - 1
+    threads = min(THREADS, chunks)
+    ends = [round(chunks * thread / threads) for thread in range(threads + 1)]
+    begun = [_pool.submit(kernel, *part, starts, *arguments) for part in zip(ends[1:-1], ends[2:])]
+    kernel(0, ends[1], starts, *arguments)
+    for one in begun:
+        one.result()
+
+
+def first_grid(points: np.ndarray, coarsening: float) -> Grid:
+    """Regular grid over points (n_points, 2) [m] with a spacing of so many times their mean distance."""
     lowest, extent = points.min(axis=0), np.ptp(points, axis=0)
-    cells = np.maximum(1, np.round(extent / spacing)).astype(np.int64)
-    widths = extent / cells
-    at = (points - lowest) / widths
-    corner = np.minimum(at.astype(np.int64), cells - 1)
-    (x, y), height = (at - corner).T, cells[1] + 1
-    node = (corner[:, 0] * height + corner[:, 1])[:, None] + [0, 1, height, height + 1]
-    weights = np.stack([(1 - x) * (1 - y), (1 - x) * y, x * (1 - y), x * y], axis=1).astype(np.float32)
-    used = np.zeros((cells + 1).prod(), dtype=bool)
-    used[node] = True
-    node = (np.cumsum(used, dtype=np.int32) - np.int32(1))[node]
-    particle, direction = np.divmod(places, 2)
-    columns = 2 * node[particle] + direction[:, None].astype(np.int32)
-    pointers = np.arange(0, 4 * len(places) + 1, 4, dtype=np.int32)
-    nodes = lowest + np.stack(np.divmod(np.flatnonzero(used), height), axis=1) * widths
-    prolong = csr_array((weights[particle].ravel(), columns.ravel(), pointers), shape=(len(places), 2 * len(nodes)))
-    prolong.eliminate_zeros()
-    return prolong, nodes
+    spacing = coarsening * np.sqrt(extent.prod() / len(points))
+    count = np.maximum(1, np.round(extent / spacing)).astype(np.int32)
+    at = (points - lowest) / (extent / count)
+    cells = np.minimum(at.astype(np.int32), count - 1)
+    return Grid(cells, (at - cells).astype(np.float32), (int(count[0]) + 1, int(count[1]) + 1))
+
+
+def next_grid(shape: tuple[int, int]) -> Grid:
+    """Grid of twice the spacing over the nodes of a regular one; a single row of cells stays one."""
+    places = [np.arange(count) / (2.0 if count > 2 else 1.0) for count in shape]
+    sizes = [count // 2 if count > 2 else 1 for count in shape]
+    parts = [np.minimum(place.astype(np.int32), size - 1) for place, size in zip(places, sizes)]
+    cells = np.stack(np.meshgrid(*parts, indexing="ij"), axis=-1).reshape(-1, 2)
+    rest = (place - part for place, part in zip(places, parts))
+    at = np.stack(np.meshgrid(*rest, indexing="ij"), axis=-1).reshape(-1, 2).astype(np.float32)
+    return Grid(cells, at, (sizes[0] + 1, sizes[1] + 1))
+
+
+def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
+    """Matrix of the nodes of a grid, for displacements that are bilinear in its cells."""
+    nodes, height, count = grid.shape[0] * grid.shape[1], grid.shape[1], 0
+    while True:
+        near, far, far_blocks = np.zeros((nodes, 13, 4)), np.empty((count, 2), np.int64), np.empty((count, 4))
+        found = kernels.coarsen(*matrix, grid.cells, grid.at, height, near, far, far_blocks)
+        if found == count:
+            break
+        count = found  # points far from each other are joined
+    diagonal = near[:, 0, [0, 1, 3]]
+    right = np.repeat([0, 1, 2], [2, 5, 5]) * height + np.concatenate([[1, 2], range(-2, 3), range(-2, 3)])
+    rows, slots = np.nonzero(near[:, 1:].any(axis=2))
+    columns, blocks = rows + right[slots], near[rows, slots + 1]
+    if count:
+        keys = np.concatenate([rows * nodes + columns, far @ [nodes, 1]])
+        order = np.argsort(keys, kind="stable")
+        keys, blocks = keys[order], np.concatenate([blocks, far_blocks])[order]
+        begin = np.flatnonzero(np.diff(keys, prepend=-1))
+        blocks, (rows, columns) = np.add.reduceat(blocks, begin), np.divmod(keys[begin], nodes)
+    return Blocks(row_pointers(rows, nodes), columns.astype(np.int32), blocks, diagonal)
+
+
+def _level(matrix: Blocks, grid: Grid) -> Level:
+    """A level of a matrix; refused if it is not positive definite."""
+    chunks = chunked(matrix, np.float32)
+    count, (rows, columns, blocks) = len(matrix.diagonal), chunks.between
+    added = np.zeros((count, 2))
+    sizes = 0.5 * np.abs(blocks.astype(float).reshape(-1, 2, 2))
+    np.add.at(added, rows, sizes.sum(axis=2))
+    np.add.at(added, columns, sizes.sum(axis=1))
+    xx, xy, yy = matrix.diagonal.T
+    if (xx < 0).any() or (yy < 0).any() or (xx * yy < xy * xy).any():
+        raise LinAlgError("a particle or node without stiffness")
+    xx, yy = xx + added[:, 0], yy + added[:, 1]
+    determinant = xx * yy - xy * xy
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.stack([yy / determinant, -xy / determinant, xx / determinant])
+        alone = np.stack([1 / xx, 0 * xx, 1 / yy])
+    inverse = np.where(determinant > 0, both, alone)
+    inverse[~np.isfinite(inverse)] = 0.0
+    room = np.zeros((count, 2), np.float32), np.zeros((count, 2), np.float32)
+    nodes = np.zeros((len(chunks.starts) - 1, grid.shape[0] * grid.shape[1], 2), np.float32)
+    near = np.flatnonzero(added.any(axis=1))
+    slower = near, added[near].astype(np.float32)
+    return Level(chunks, np.ascontiguousarray(inverse.T, np.float32), slower, grid, (*room, nodes))

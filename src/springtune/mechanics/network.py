@@ -258,19 +258,23 @@ class Network:
 
         It is taken at `displacements` [m], or at rest.
         """
-        couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros(())
-        if self.energies:
-            at_rest = displacements is None
-            of_cells = self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)
-            couplings = couplings + of_cells
-        data = self._pattern.coupling_entries(couplings)
+        data = self._pattern.coupling_entries(self._couplings(displacements))
         if follower is not None:
             s, load = follower
             data -= s * self._pattern.entries(load.edges, load.derivative)
         return self._pattern.matrix(data)
 
-    def _spring_couplings(self, displacements: np.ndarray | None) -> np.ndarray:
+    def _couplings(self, displacements: np.ndarray | None) -> np.ndarray:
         """Blocks of the tangent that couple the ends of each spring, shape (2, 2, n_springs)."""
+        couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros((2, 2, len(self.first)))
+        if self.energies:
+            at_rest = displacements is None
+            of_cells = self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)
+            couplings = couplings + of_cells
+        return couplings
+
+    def _spring_couplings(self, displacements: np.ndarray | None) -> np.ndarray:
+        """Share of the springs in `_couplings`."""
         if displacements is None:
             vectors, ratio = self.rest_vectors, np.ones(len(self.rest_lengths))
             squares = self.rest_lengths**2
@@ -351,6 +355,8 @@ class Network:
         """Factorize the tangent at `displacements`, or at rest."""
         if self._by_multigrid and self._loose:
             raise SingularError(self._loose)
+        if self._by_multigrid and not (self._by_cholesky and follower is None):
+            return self._multigrid(displacements, follower)
         return self.factorize_matrix(self.tangent(displacements, follower), symmetric=follower is None)
 
     @cached_property
@@ -369,7 +375,7 @@ class Network:
             factor = self._cholesky(matrix)
             if factor is not None:
                 return factor
-        return self._multigrid(matrix, symmetric) if self._by_multigrid else self._superlu(matrix)
+        return self._superlu(matrix)
 
     def _superlu(self, matrix: csc_array) -> SuperLUFactor:
         order, places, indices, pointers = self._pattern.elimination
@@ -409,29 +415,35 @@ class Network:
         """Return whether the tangent's symmetric part is positive definite; cheaper than a factorization for use."""
         if follower is not None:
             follower = follower[0], follower[1].symmetric
-        matrix = self.tangent(displacements, follower)
         if self._by_cholesky:
-            return self._pattern.analysis.factorize(matrix.data) is not None
+            return self._pattern.analysis.factorize(self.tangent(displacements, follower).data) is not None
         try:
-            return not (self._by_multigrid and self._loose) and self.factorize_matrix(matrix).negative_pivots == 0
+            if self._by_multigrid:
+                return not self._loose and self._multigrid(displacements, follower).negative_pivots == 0
+            return self._superlu(self.tangent(displacements, follower)).negative_pivots == 0
         except SingularError:
             return False
 
-    def _multigrid(self, matrix: csc_array, symmetric: bool) -> Factor:
+    def _multigrid(self, displacements: np.ndarray | None, follower: tuple[float, FollowerPressure] | None) -> Factor:
         from ..linalg.multigrid import Multigrid
 
-        next_one = successor(self.solver, self.unknowns, symmetric)
+        next_one = successor(self.solver, self.unknowns, follower is None)
 
         def otherwise() -> Factor:
+            matrix = self.tangent(displacements, follower)
             factor = self._cholesky(matrix) if next_one == "Cholesky" else self._superlu(matrix)
             if factor is None:
                 raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
             return factor
 
-        rows = matrix.T if symmetric else matrix.tocsr()
+        besides = None
+        if follower is not None:
+            s, load = follower
+            besides = self._pattern.loose_entries(load.edges, -s * load.derivative)
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
-        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if next_one else None, like)
+        blocks = self._pattern.blocks(self._couplings(displacements))
+        return Multigrid(blocks, self.mesh.points, self.held, otherwise if next_one else None, like, besides)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from ..linalg.blocks import Blocks, row_pointers
 from ..linalg.factors import Analysis, nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
@@ -35,8 +36,18 @@ class Pattern:
         number = np.full(held.size, -1)
         number[self.places] = np.arange(self.size)
         self.number = number.reshape(-1, 2)
-        self.indices, self.pointers, self.sources = self._sparsity()
 
+    @property
+    def indices(self) -> np.ndarray:
+        """Rows of the entries, shape (n_entries,)."""
+        return self._sparsity[0]
+
+    @property
+    def pointers(self) -> np.ndarray:
+        """Pointers of the columns, shape (size + 1,)."""
+        return self._sparsity[1]
+
+    @cached_property
     def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rows, column pointers, and each entry's place in what `coupling_entries` assembles.
 
@@ -178,14 +189,31 @@ class Pattern:
 
         A common displacement costs nothing, so a particle's own block is minus the sum of its springs' blocks.
         """
+        own = self._own(couplings)
+        return np.concatenate([couplings.ravel(), *own[[0, 1, 1, 2]]])[self._sparsity[2]]
+
+    def _own(self, couplings: np.ndarray) -> np.ndarray:
+        """Return xx, xy and yy of each particle's own block, shape (3, n_points)."""
         count = self.shape[0]
-        own = np.empty((2, 2, count))
-        for a in range(2):
-            for d in range(a, 2):
-                own[a, d] = -np.bincount(self.first, couplings[a, d], count)
-                own[a, d] -= np.bincount(self.second, couplings[d, a], count)
-        own[1, 0] = own[0, 1]
-        return np.concatenate([couplings.ravel(), own.ravel()])[self.sources]
+        own = np.empty((3, count))
+        for place, (a, d) in enumerate([(0, 0), (0, 1), (1, 1)]):
+            own[place] = -np.bincount(self.first, couplings[a, d], count)
+            own[place] -= np.bincount(self.second, couplings[d, a], count)
+        return own
+
+    def blocks(self, couplings: np.ndarray) -> Blocks:
+        """Return the tangent in blocks, as `coupling_entries`, with zeros where directions are held."""
+        held = np.ones(self.shape, dtype=bool)
+        held.ravel()[self.places] = False
+        blocks = np.ascontiguousarray(couplings.reshape(4, -1).T)
+        diagonal = np.ascontiguousarray(self._own(couplings).T)
+        fixed = np.flatnonzero(held.any(axis=1)[self.springs].any(axis=1))
+        free = ~held[self.springs[fixed]]
+        blocks[fixed] *= (free[:, 0, :, None] & free[:, 1, None, :]).reshape(-1, 4)
+        particles = np.flatnonzero(held.any(axis=1))
+        free = ~held[particles]
+        diagonal[particles] *= np.stack([free[:, 0], free.all(axis=1), free[:, 1]], axis=1)
+        return Blocks(row_pointers(self.first, self.shape[0]), self.second.astype(np.int32), blocks, diagonal)
 
     def entries(self, particles: np.ndarray, matrices: np.ndarray) -> np.ndarray:
         """Entries of matrices of groups of joined particles, shape (n, 2 m, 2 m)."""
@@ -195,6 +223,14 @@ class Pattern:
         kept = np.flatnonzero((rows >= 0) & (columns >= 0))
         places = np.searchsorted(self.codes, columns[kept] * self.size + rows[kept])
         return np.bincount(places, matrices.ravel()[kept], len(self.indices))
+
+    def loose_entries(self, particles: np.ndarray, matrices: np.ndarray) -> csr_array:
+        """Matrix over all directions (2 n_points, 2 n_points) of groups of particles, without those that are held."""
+        local = (2 * particles[:, :, None] + [0, 1]).reshape(len(particles), -1)
+        width, free = local.shape[1], self.number.ravel() >= 0
+        rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()
+        values = np.where(free[rows] & free[columns], matrices.ravel(), 0.0)
+        return csr_array((values, (rows, columns)), shape=(self.number.size, self.number.size))
 
     def matrix(self, data: np.ndarray) -> csc_array:
         """Sparse matrix of these entries."""
