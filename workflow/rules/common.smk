@@ -33,6 +33,7 @@ for variable, value in {
     # One thread a process: solvers are sequential, and Snakemake shares out the cores.
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
     # Keep freed memory in the process: returning it to the system between solves costs a third of their time.
     "MALLOC_MMAP_THRESHOLD_": str(2**25),
     "MALLOC_TRIM_THRESHOLD_": str(2**29),

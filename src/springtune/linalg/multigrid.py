@@ -3,10 +3,11 @@
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
@@ -145,8 +146,8 @@ class Multigrid:
         self.name = self._direct.name
         return self._direct
 
-    def _cycle(self, depth: int, right: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return what a multigrid cycle makes of a right-hand side, in room that the next one uses again; their product."""
+    def cycle(self, depth: int, right: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return a cycle's answer to a right-hand side, in an array that the next one overwrites, and their product."""
         if depth == len(self._levels):
             places, factor = self._coarsest
             solution = np.zeros(right.shape, dtype=np.float32)
@@ -158,7 +159,7 @@ class Multigrid:
         run(kernels.sweep_down, *sweep, inverse, right, x, excess)
         kernels.couple(*chunks.between, *added, x, excess)
         run(kernels.restrict, starts, grid.cells, grid.at, height, excess, nodes)
-        coarse, _ = self._cycle(depth + 1, nodes[0] if len(nodes) == 1 else nodes.sum(axis=0))
+        coarse, _ = self.cycle(depth + 1, nodes[0] if len(nodes) == 1 else nodes.sum(axis=0))
         run(kernels.prolong, starts, grid.cells, grid.at, height, coarse, x, excess)
         kernels.couple(*chunks.between, *added, x, excess)
         run(kernels.sweep_up, *sweep, inverse, right, x, excess, work)
@@ -218,11 +219,11 @@ class Multigrid:
         if proves:
             random = np.random.default_rng(0).standard_normal(len(self._places))
             right.ravel()[self._places] = random / np.linalg.norm(random)
-            self._multiply(self._cycle(0, right)[0], size, 0.0, solution, forces)
+            self._multiply(self.cycle(0, right)[0], size, 0.0, solution, forces)
             missing -= forces
         np.multiply(missing, scale, out=right, casting="same_kind")
         direction, keep = np.zeros(missing.shape), 0.0
-        better, weight = self._cycle(0, right)
+        better, weight = self.cycle(0, right)
         starts = self._product.starts
         squares = np.empty(len(starts) - 1)
         for count in range(MAX_CG_ITERATIONS):
@@ -239,7 +240,7 @@ class Multigrid:
                 self._certain |= proves
                 return solution
             before = weight
-            better, weight = self._cycle(0, right)
+            better, weight = self.cycle(0, right)
             keep = weight / before
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
 
@@ -248,9 +249,8 @@ class Multigrid:
         xx, xy, yy = self._matrix.diagonal.T
         free = np.zeros(self._points.shape, dtype=bool)
         free.ravel()[self._places] = True
-        both, one = free.all(axis=1), free.any(axis=1)
-        product, alone = (xx * yy)[both], np.where(free[:, 0], xx, yy)[one]
-        if not alone.all() or (abs(product - xy[both] ** 2) <= IN_LINE * abs(product)).any():
+        product = np.where(free[:, 0], xx, 1.0) * np.where(free[:, 1], yy, 1.0)
+        if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
             raise SingularError("a particle is free to move: its springs, if any, are in one line")
 
     def step(self, right: np.ndarray) -> np.ndarray:
@@ -276,16 +276,18 @@ class Multigrid:
         return 0 if self._direct is None else self._direct.negative_pivots
 
 
-THREADS = min(CHUNKS, int(os.environ.get("OMP_NUM_THREADS") or 0) or len(os.sched_getaffinity(0)))
-_pool = ThreadPoolExecutor(max(1, THREADS - 1))
+@lru_cache
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Threads of a process besides its main one; a forked process has none of its parent's."""
+    return ThreadPoolExecutor(max(1, min(CHUNKS, config.NUMBA_NUM_THREADS) - 1))
 
 
 def run(kernel: Callable[..., None], starts: np.ndarray, *arguments: Any) -> None:
-    """Run a kernel on all chunks of rows, by several threads if there are several."""
+    """Run a kernel on all chunks of rows, in as many threads as numba would take."""
     chunks = len(starts) - 1
-    threads = min(THREADS, chunks)
-    ends = [round(chunks * thread / threads) for thread in range(threads + 1)]
-    begun = [_pool.submit(kernel, *part, starts, *arguments) for part in zip(ends[1:-1], ends[2:])]
+    threads = min(chunks, config.NUMBA_NUM_THREADS)
+    ends = [chunks * thread // threads for thread in range(threads + 1)]
+    begun = [_pool(os.getpid()).submit(kernel, *part, starts, *arguments) for part in zip(ends[1:-1], ends[2:])]
     kernel(0, ends[1], starts, *arguments)
     for one in begun:
         one.result()

@@ -13,27 +13,21 @@ core's cache; steps follow each other at the distance of the bandwidth. Several 
 summation do not depend on threads or block size.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numba import config, njit, types
+from numba import config, types
 from numba.extending import intrinsic
+
+from ..linalg.kernels import compiled
 
 PATIENCE = 1000
 """Checks of another thread, some microseconds, before a waiting thread yields its core."""
 
 STRIDE = 8
 """Array entries between progress counters of threads: a cache line, against false sharing."""
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile on the first call, and cache on disk if possible."""
-    try:
-        return njit(cache=True, error_model="numpy", nogil=True)(function)
-    except RuntimeError:  # no folder to keep it in
-        return njit(error_model="numpy", nogil=True)(function)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ..linalg import SOLVERS
+from ..linalg.blocks import Blocks
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
 from ..mesh.cells import Mesh
 from ..mesh.sheets import check_held
@@ -264,6 +265,10 @@ class Network:
             data -= s * self._pattern.entries(load.edges, load.derivative)
         return self._pattern.matrix(data)
 
+    def blocks(self, displacements: np.ndarray | None = None) -> Blocks:
+        """Return `tangent` in blocks of 2 x 2."""
+        return self._pattern.blocks(self._couplings(displacements))
+
     def _couplings(self, displacements: np.ndarray | None) -> np.ndarray:
         """Blocks of the tangent that couple the ends of each spring, shape (2, 2, n_springs)."""
         couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros((2, 2, len(self.first)))
@@ -442,8 +447,9 @@ class Network:
             besides = self._pattern.loose_entries(load.edges, -s * load.derivative)
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
-        blocks = self._pattern.blocks(self._couplings(displacements))
-        return Multigrid(blocks, self.mesh.points, self.held, otherwise if next_one else None, like, besides)
+        return Multigrid(
+            self.blocks(displacements), self.mesh.points, self.held, otherwise if next_one else None, like, besides
+        )
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

@@ -139,9 +139,8 @@ VERSIONS = {
     **dict.fromkeys(("matplotlib", "xarray", "h5py", "pint", "pydantic", "snakemake"), set()),
     "netgen-mesher": {"free", "bodies.mesh", "bodies.reference", "bodies.solve", "engines.solve"},
     "meshio": {"from a file"},
-    "numba": {"stability.solve", "benchmark.solve", "engines.solve"},
+    "numba": SOLVING,
     "scikit-fem": {"bodies.reference", "benchmark.solve", "bodies.solve", "engines.solve"},
-    "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
     "scipy": SOLVING | REFERENCE | {"bodies.mesh", "box", "bodies.calibrate", "from a file", "lattice"},
 }

@@ -28,7 +28,6 @@ SOFTWARE = (
     "netgen-mesher",
     "numba",
     "numpy",
-    "pyamg",
     "scikit-fem",
     "scipy",
     "snakemake",
