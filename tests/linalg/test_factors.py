@@ -11,7 +11,7 @@ from scipy.sparse import csc_array, csr_array
 
 import springtune
 from springtune.linalg import kernels
-from springtune.linalg.blocks import Blocks, dense, row_pointers
+from springtune.linalg.blocks import Blocks, chunked, dense, first_grid, next_grid, row_pointers
 from springtune.linalg.factors import (
     Analysis,
     SingularError,
@@ -21,7 +21,7 @@ from springtune.linalg.factors import (
     nested_dissection,
     spread,
 )
-from springtune.linalg.multigrid import IndefiniteError, Multigrid, first_grid, galerkin, next_grid
+from springtune.linalg.multigrid import IndefiniteError, Multigrid, galerkin
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
@@ -213,11 +213,12 @@ def iterative(network, displacements=None, otherwise=None):
 def interpolation(grid):
     """Matrix from the displacements of a grid's nodes to those of its points."""
     count, nodes = len(grid.cells), grid.shape[0] * grid.shape[1]
-    columns = []
+    empty = Blocks(np.zeros(count + 1, int), np.zeros(0, int), np.zeros((0, 4)), np.zeros((count, 3)))
+    columns, rows = [], chunked(empty)
     for node in range(2 * nodes):
         coarse, fine = np.zeros((nodes, 2), np.float32), np.zeros((count, 2), np.float32)
         coarse.ravel()[node] = 1
-        kernels.prolong(0, 1, np.array([0, count]), grid.cells, grid.at, grid.shape[1], coarse, fine, fine.copy())
+        kernels.prolong(0, 1, rows, grid, coarse, fine, fine.copy())
         columns.append(fine.ravel())
     return np.array(columns, float).T
 
@@ -271,7 +272,7 @@ def test_coarse_matrices_are_galerkins(seed, coarsening):
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_chunks_of_rows_multiply_and_precondition_the_same_with_any_number_of_threads(monkeypatch, threads):
     monkeypatch.setattr("springtune.linalg.blocks.ROWS_PER_CHUNK", 1)
-    monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", threads)
+    monkeypatch.setattr("springtune.linalg.multigrid.THREADS", threads)
     points, matrix, full = scattered_blocks(np.random.default_rng(0), 300)
     factor = Multigrid(matrix, points, np.zeros(points.shape, dtype=bool))
     right = np.random.default_rng(1).standard_normal(600)
@@ -280,7 +281,7 @@ def test_chunks_of_rows_multiply_and_precondition_the_same_with_any_number_of_th
     cycles = np.array([factor.cycle(0, unit.reshape(-1, 2))[0].flatten() for unit in np.eye(600, dtype=np.float32)])
     assert np.abs(cycles - cycles.T).max() <= 1e-4 * np.abs(cycles).max()
     assert np.linalg.eigvalsh(cycles + cycles.T).min() > 0
-    monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", 3)
+    monkeypatch.setattr("springtune.linalg.multigrid.THREADS", 3)
     other = Multigrid(matrix, points, np.zeros(points.shape, dtype=bool))
     assert np.array_equal(solution, other.solve(right))
 

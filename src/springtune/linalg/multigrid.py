@@ -6,13 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
-from numba import config
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
 from . import kernels
-from .blocks import CHUNKS, Blocks, Chunks, chunked, dense, row_pointers
+from .blocks import CHUNKS, Blocks, Chunks, Grid, chunked, dense, first_grid, next_grid, row_pointers, smoother
 from .factors import Factor, SingularError
 
 RESIDUAL = 1e-11
@@ -45,8 +45,8 @@ IN_LINE = 1e-14
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
-NOWHERE = np.empty(0, np.int64), np.empty((0, 2))
-"""No rows, and nothing that their diagonal gets besides."""
+THREADS: int = vars(numba.config)["NUMBA_NUM_THREADS"]
+"""Threads of a solve: processors of this process, or the environment variable NUMBA_NUM_THREADS."""
 
 
 class NotPositiveError(SingularError):
@@ -57,20 +57,10 @@ class IndefiniteError(NotPositiveError):
     """Conjugate gradients met a direction without stiffness."""
 
 
-class Grid(NamedTuple):
-    """Cell of a regular grid that each point of a finer one is in, and its place within, from 0 to 1."""
-
-    cells: np.ndarray
-    at: np.ndarray
-    shape: tuple[int, int]
-
-
 class Level(NamedTuple):
-    """A matrix in single precision with its smoother, and the step to the next coarser grid."""
+    """Smoother of a matrix, the next coarser grid, and room for two fields and the forces on the grid's nodes."""
 
-    chunks: Chunks
-    inverse: np.ndarray
-    added: tuple[np.ndarray, np.ndarray]
+    smoother: Chunks
     grid: Grid
     room: tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -81,9 +71,7 @@ class Multigrid:
     It replaces a factor, see `springtune.linalg.factors.Factor`. Node displacements are interpolated bilinearly to
     the particles and from grid to grid, each twice as wide, so rigid motions and even strains are exact. Coarse
     matrices are Galerkin's; a cycle takes one Gauss-Seidel sweep down and one up, in single precision, enough to
-    precondition. Between chunks of rows sweeps are Jacobi's, with half the couplings' size on the diagonal, so the
-    preconditioner stays positive definite (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864,
-    2011). Time and memory are proportional to the unknowns n; a factorization's grow as n^(3/2) and n log n.
+    precondition. Time and memory are proportional to the unknowns n; a factorization's grow as n^(3/2) and n log n.
     Method: J. Xu, The auxiliary space method and optimal multigrid preconditioning techniques for unstructured grids,
     Computing 56:215, 1996.
 
@@ -123,7 +111,7 @@ class Multigrid:
 
     def _coarsened(self) -> tuple[np.ndarray, Any]:
         """Lay levels down to the coarsest one, whose unknowns and dense factor are returned."""
-        matrix, size = self._matrix, len(self._places)
+        matrix, size = self._matrix, int(len(self._places))
         # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
         # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
         if not (matrix.diagonal[:, ::2].ravel()[self._places] > 0).all():
@@ -133,7 +121,7 @@ class Multigrid:
             coarse = galerkin(matrix, grid)
             self._levels.append(_level(matrix, grid))
             matrix, grid = coarse, next_grid(grid.shape)
-            size = np.count_nonzero(matrix.diagonal[:, ::2])
+            size = int(np.count_nonzero(matrix.diagonal[:, ::2]))
         places = np.flatnonzero(matrix.diagonal[:, ::2])
         return places, cho_factor(dense(matrix)[np.ix_(places, places)])
 
@@ -153,16 +141,15 @@ class Multigrid:
             solution = np.zeros(right.shape, dtype=np.float32)
             solution.ravel()[places] = cho_solve(factor, right.ravel()[places].astype(float), check_finite=False)
             return solution, float(np.vdot(solution, right))
-        chunks, inverse, added, grid, (x, excess, nodes) = self._levels[depth]
-        starts, height, sweep = chunks.starts, grid.shape[1], chunks[:4]
-        work = np.empty(len(starts) - 1)
-        run(kernels.sweep_down, *sweep, inverse, right, x, excess)
-        kernels.couple(*chunks.between, *added, x, excess)
-        run(kernels.restrict, starts, grid.cells, grid.at, height, excess, nodes)
+        matrix, grid, (x, excess, nodes) = self._levels[depth]
+        work = np.empty(len(nodes))
+        run(kernels.sweep_down, matrix, right, x, excess)
+        kernels.couple(matrix, x, excess)
+        run(kernels.restrict, matrix, grid, excess, nodes)
         coarse, _ = self.cycle(depth + 1, nodes[0] if len(nodes) == 1 else nodes.sum(axis=0))
-        run(kernels.prolong, starts, grid.cells, grid.at, height, coarse, x, excess)
-        kernels.couple(*chunks.between, *added, x, excess)
-        run(kernels.sweep_up, *sweep, inverse, right, x, excess, work)
+        run(kernels.prolong, matrix, grid, coarse, x, excess)
+        kernels.couple(matrix, x, excess)
+        run(kernels.sweep_up, matrix, right, x, excess, work)
         return x, float(work.sum())
 
     def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:
@@ -185,10 +172,10 @@ class Multigrid:
         self, better: np.ndarray, scale: float, keep: float, direction: np.ndarray, forces: np.ndarray
     ) -> float:
         """Set the next direction and its forces, and return their product, see `kernels.multiply`."""
-        chunks = self._product
-        work = np.empty(len(chunks.starts) - 1)
-        run(kernels.multiply, *chunks[:4], self._matrix.diagonal, better, scale, keep, direction, forces, work)
-        total = float(work.sum()) + kernels.couple(*chunks.between, *NOWHERE, direction, forces)
+        matrix = self._product
+        work = np.empty(len(matrix.starts) - 1)
+        run(kernels.multiply, matrix, better, scale, keep, direction, forces, work)
+        total = float(work.sum()) + kernels.couple(matrix, direction, forces)
         if self._besides is not None:
             more = (self._besides @ direction.ravel()).reshape(forces.shape)
             forces += more
@@ -215,17 +202,15 @@ class Multigrid:
         if self._coarsest is None:
             raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
         scale, forces = 1.0 / size, np.zeros(missing.shape)
-        right = np.zeros(missing.shape, dtype=np.float32)
+        right, squares = np.zeros(missing.shape, np.float32), np.empty(len(self._product.starts) - 1)
         if proves:
             random = np.random.default_rng(0).standard_normal(len(self._places))
             right.ravel()[self._places] = random / np.linalg.norm(random)
             self._multiply(self.cycle(0, right)[0], size, 0.0, solution, forces)
             missing -= forces
-        np.multiply(missing, scale, out=right, casting="same_kind")
+        run(kernels.scaled, self._product, scale, missing, right, squares)
         direction, keep = np.zeros(missing.shape), 0.0
         better, weight = self.cycle(0, right)
-        starts = self._product.starts
-        squares = np.empty(len(starts) - 1)
         for count in range(MAX_CG_ITERATIONS):
             if self._borrowed and count == MOST_BORROWED:
                 self._lay_grids()
@@ -235,7 +220,8 @@ class Multigrid:
             if not stiffness > 0 or not weight > 0:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
             length = weight * size * size / stiffness
-            run(kernels.advance, starts, length, direction, forces, solution, missing, scale, right, squares)
+            run(kernels.advance, self._product, length, direction, forces, solution, missing)
+            run(kernels.scaled, self._product, scale, missing, right, squares)
             if squares.sum() ** 0.5 <= tolerance * size:
                 self._certain |= proves
                 return solution
@@ -279,39 +265,18 @@ class Multigrid:
 @lru_cache
 def _pool(process: int) -> ThreadPoolExecutor:
     """Threads of a process besides its main one; a forked process has none of its parent's."""
-    return ThreadPoolExecutor(max(1, min(CHUNKS, config.NUMBA_NUM_THREADS) - 1))
+    return ThreadPoolExecutor(max(1, min(CHUNKS, THREADS) - 1))
 
 
-def run(kernel: Callable[..., None], starts: np.ndarray, *arguments: Any) -> None:
+def run(kernel: Callable[..., None], matrix: Chunks, *arguments: Any) -> None:
     """Run a kernel on all chunks of rows, in as many threads as numba would take."""
-    chunks = len(starts) - 1
-    threads = min(chunks, config.NUMBA_NUM_THREADS)
+    chunks = len(matrix.starts) - 1
+    threads = min(chunks, THREADS)
     ends = [chunks * thread // threads for thread in range(threads + 1)]
-    begun = [_pool(os.getpid()).submit(kernel, *part, starts, *arguments) for part in zip(ends[1:-1], ends[2:])]
-    kernel(0, ends[1], starts, *arguments)
+    begun = [_pool(os.getpid()).submit(kernel, *part, matrix, *arguments) for part in zip(ends[1:-1], ends[2:])]
+    kernel(0, ends[1], matrix, *arguments)
     for one in begun:
         one.result()
-
-
-def first_grid(points: np.ndarray, coarsening: float) -> Grid:
-    """Regular grid over points (n_points, 2) [m] with a spacing of so many times their mean distance."""
-    lowest, extent = points.min(axis=0), np.ptp(points, axis=0)
-    spacing = coarsening * np.sqrt(extent.prod() / len(points))
-    count = np.maximum(1, np.round(extent / spacing)).astype(np.int32)
-    at = (points - lowest) / (extent / count)
-    cells = np.minimum(at.astype(np.int32), count - 1)
-    return Grid(cells, (at - cells).astype(np.float32), (int(count[0]) + 1, int(count[1]) + 1))
-
-
-def next_grid(shape: tuple[int, int]) -> Grid:
-    """Grid of twice the spacing over the nodes of a regular one; a single row of cells stays one."""
-    places = [np.arange(count) / (2.0 if count > 2 else 1.0) for count in shape]
-    sizes = [count // 2 if count > 2 else 1 for count in shape]
-    parts = [np.minimum(place.astype(np.int32), size - 1) for place, size in zip(places, sizes)]
-    cells = np.stack(np.meshgrid(*parts, indexing="ij"), axis=-1).reshape(-1, 2)
-    rest = (place - part for place, part in zip(places, parts))
-    at = np.stack(np.meshgrid(*rest, indexing="ij"), axis=-1).reshape(-1, 2).astype(np.float32)
-    return Grid(cells, at, (sizes[0] + 1, sizes[1] + 1))
 
 
 def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
@@ -319,7 +284,7 @@ def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
     nodes, height, count = grid.shape[0] * grid.shape[1], grid.shape[1], 0
     while True:
         near, far, far_blocks = np.zeros((nodes, 13, 4)), np.empty((count, 2), np.int64), np.empty((count, 4))
-        found = kernels.coarsen(*matrix, grid.cells, grid.at, height, near, far, far_blocks)
+        found = kernels.coarsen(matrix, grid, near, far, far_blocks)
         if found == count:
             break
         count = found  # points far from each other are joined
@@ -337,25 +302,7 @@ def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
 
 
 def _level(matrix: Blocks, grid: Grid) -> Level:
-    """A level of a matrix; refused if it is not positive definite."""
-    chunks = chunked(matrix, np.float32)
-    count, (rows, columns, blocks) = len(matrix.diagonal), chunks.between
-    added = np.zeros((count, 2))
-    sizes = 0.5 * np.abs(blocks.astype(float).reshape(-1, 2, 2))
-    np.add.at(added, rows, sizes.sum(axis=2))
-    np.add.at(added, columns, sizes.sum(axis=1))
-    xx, xy, yy = matrix.diagonal.T
-    if (xx < 0).any() or (yy < 0).any() or (xx * yy < xy * xy).any():
-        raise LinAlgError("a particle or node without stiffness")
-    xx, yy = xx + added[:, 0], yy + added[:, 1]
-    determinant = xx * yy - xy * xy
-    with np.errstate(divide="ignore", invalid="ignore"):
-        both = np.stack([yy / determinant, -xy / determinant, xx / determinant])
-        alone = np.stack([1 / xx, 0 * xx, 1 / yy])
-    inverse = np.where(determinant > 0, both, alone)
-    inverse[~np.isfinite(inverse)] = 0.0
-    room = np.zeros((count, 2), np.float32), np.zeros((count, 2), np.float32)
+    """Level of a matrix; raises LinAlgError if it is not positive definite."""
+    chunks = smoother(matrix)
     nodes = np.zeros((len(chunks.starts) - 1, grid.shape[0] * grid.shape[1], 2), np.float32)
-    near = np.flatnonzero(added.any(axis=1))
-    slower = near, added[near].astype(np.float32)
-    return Level(chunks, np.ascontiguousarray(inverse.T, np.float32), slower, grid, (*room, nodes))
+    return Level(chunks, grid, (np.zeros(grid.cells.shape, np.float32), np.zeros(grid.cells.shape, np.float32), nodes))

@@ -203,8 +203,7 @@ class Pattern:
 
     def blocks(self, couplings: np.ndarray) -> Blocks:
         """Return the tangent in blocks, as `coupling_entries`, with zeros where directions are held."""
-        held = np.ones(self.shape, dtype=bool)
-        held.ravel()[self.places] = False
+        held: np.ndarray = self.number < 0
         blocks = np.ascontiguousarray(couplings.reshape(4, -1).T)
         diagonal = np.ascontiguousarray(self._own(couplings).T)
         fixed = np.flatnonzero(held.any(axis=1)[self.springs].any(axis=1))
