@@ -41,51 +41,6 @@ def test_what_is_used_alone_does_not_import_what_is_heavy(program, heavy):
     assert not set(heavy.split()) & set(done.stdout.splitlines()[-1].split())
 
 
-def package_names(tree):
-    """Names in a test that come from the package."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "springtune":
-            yield from (alias.asname or alias.name for alias in node.names)
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                if alias.name.partition(".")[0] == "springtune":
-                    yield alias.asname or "springtune"
-
-
-def root(node):
-    """Name at the beginning of a chain of attributes, or a text that is one."""
-    while isinstance(node, ast.Attribute | ast.Call | ast.Subscript):
-        node = node.func if isinstance(node, ast.Call) else node.value
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return node.value.partition(".")[0]
-    return node.id if isinstance(node, ast.Name) else ""
-
-
-TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))
-
-
-@pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(REPOSITORY / "tests")))
-def test_tests_use_what_everybody_may_use(path):
-    """Nothing of the package is patched, and no private name imported (of attributes ruff says so).
-
-    Entries of a registry may come and go with a test: that is what registries are for.
-    """
-    tree, found = ast.parse(path.read_bytes()), []
-    names = {"springtune", *package_names(tree)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "springtune":
-            found += [(node.lineno, alias.name) for alias in node.names if alias.name.startswith("_")]
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and root(node.func) == "monkeypatch":
-            if node.func.attr in ("setattr", "delattr") and root(node.args[0]) in names:
-                found.append((node.lineno, f"monkeypatch.{node.func.attr}"))
-        elif isinstance(node, ast.Assign):
-            targets = [target for target in node.targets if isinstance(target, ast.Attribute)]
-            found += [
-                (node.lineno, f"{root(target)}.{target.attr} = ...") for target in targets if root(target) in names
-            ]
-    assert not found, "\n".join(f"{path.relative_to(REPOSITORY)}:{line}: {what}" for line, what in found)
-
-
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
 OWN |= {"KIND", "OUTPUTS", "PAGE", "STAGE", "STAGES", "VIEWS"}
 """Constants that say the same of each solver or each study kind, and that each has its own value of."""

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import springtune
@@ -19,7 +18,7 @@ from springtune.mesh import MESH_TYPES, mesh_type
 from springtune.problem.boundary import held, weights
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS, Springs, definition
+from springtune.springs import DEFINITIONS, definition
 from springtune.studies.runs import keys
 
 from tables import STUDIES
@@ -100,32 +99,6 @@ class TestOutsideThePackage:
         assert displacement("lattice", "left") == pytest.approx(displacement("lattice", "right"), rel=0.01)
         digest = keys.mesh_type_closure("left").digest
         assert digest not in {keys.mesh_type_closure(name).digest for name in set(names) - {"left"}}
-
-    def test_what_a_file_imports_from_beside_it_is_part_of_its_digest(self, tmp_path, monkeypatch):
-        text, digests = outside_package("springs/twice.py"), set()
-        text = text.replace("    found =", "    from beside import factor\n\n    found =")
-        for number in "1", "2":
-            folder = tmp_path / number
-            folder.mkdir()
-            (folder / "beside.py").write_text(f"factor = {number}\n")
-            (folder / f"own{number}.py").write_text(text)
-            monkeypatch.syspath_prepend(folder)
-            importlib.import_module(f"own{number}")
-            digests.add(keys.definition_closure("twice").digest)
-            DEFINITIONS.discard("twice")
-            sys.modules.pop(f"own{number}")
-        assert len(digests) == 2
-
-    def test_a_cell_that_runs_again_replaces_what_it_declared(self, outside):
-        del outside  # takes out what is declared here
-        for factor in (1.0, 3.0):
-
-            @definition("cell")
-            def springs(mesh, material, thickness, factor=factor):
-                return Springs(factor, np.ones(len(mesh.edges)))
-
-        assert list(DEFINITIONS)[-1] == "cell"
-        assert DEFINITIONS["cell"].springs(MESH_TYPES["right"](0.1, 0.02, 0.01), STEEL, 1e-3).reference == 3.0
 
     @pytest.mark.parametrize(
         ("declare", "name"), [(definition, "lattice"), (mesh_type, "structured")], ids=["definition", "mesh type"]

@@ -6,23 +6,18 @@ import os
 import re
 import runpy
 import shlex
-import subprocess
 import sys
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 
-import click
 import jsonschema
-import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
 
 import springtune
 from counting import counted
-from springtune.cli import COMMANDS, Commands, Shown, main
-from springtune.cli.recommendation import beam_subject, prediction_text
+from springtune.cli import COMMANDS, Shown, main
 from springtune.handover.formats import NET_FORMATS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
@@ -33,8 +28,7 @@ from springtune.problem.materials import Material
 from springtune.scene.sheet import Sheet
 from springtune.scene.statements import unit_reference
 from springtune.springs import DEFINITIONS
-from springtune.studies.config.kind import kinds
-from springtune.studies.config.sections import schema_text, study_model
+from springtune.studies.config.sections import schema_text
 from springtune.studies.kinds import load_study
 
 from tables import STUDIES, refused_calls, refused_numbers, run
@@ -145,18 +139,6 @@ class TestScenes:
         assert "printed 45 cells to compare with" in lines
         assert [line for line in lines if line.startswith("table ")] == [f"table {n} 54 54 9 3 18" for n in range(1, 6)]
 
-    def test_says_what_grids_share(self, tmp_path):
-        text = (CONFIG / "quick.yaml").read_text().replace("printed: paper_tables.csv\n", "")
-        grids = text.partition("grids:\n")[2]
-        for name in ("steel", "compression", "transverse", "shear", "pressed", "rubber"):
-            grids = grids.replace(f"  {name}:\n", f"  {name} again:\n")
-        path = tmp_path / "twice.yaml"
-        path.write_text(f"{text}\n{grids}")
-        lines = words(run("scenes", path).stdout)
-        assert "scenes 50 100 asked, 50 of them more than once" in lines
-        assert "steel 24 24 4 1 8" in lines
-        assert "steel again 24 0 4 1 8" in lines
-
     def test_bad_study_is_one_message_and_exit_code_1(self, tmp_path):
         path = tmp_path / "bad.yaml"
         path.write_text((CONFIG / "quick.yaml").read_text().replace("length:", "lenght:", 1))
@@ -168,12 +150,6 @@ class TestScenes:
             "did you mean 'length'? known: length, height, thickness\n"
         )
         assert [file.name for file in tmp_path.iterdir()] == ["bad.yaml"]
-
-
-def test_runs_as_a_module():
-    done = subprocess.run([sys.executable, "-m", "springtune", "--version"], capture_output=True, text=True)
-    assert done.returncode == 0
-    assert "version" in done.stdout
 
 
 def test_definitions_lists_all_with_summaries():
@@ -209,23 +185,6 @@ class TestSchema:
         text = (CONFIG / MANUAL).read_text()
         assert manual_text(text) == text, RENEW
 
-    def test_write_renews_both_and_keeps_the_frame(self, tmp_path):
-        (tmp_path / MANUAL).write_text(f"before\n{BEGIN}stale\n{END}after\n")
-        TOOL["main"](tmp_path)
-        text = (tmp_path / MANUAL).read_text()
-        assert text.startswith("before\n")
-        assert text.endswith("after\n")
-        assert "stale" not in text
-        assert "| `poisson_ratio` |" in text
-        assert json.loads((tmp_path / SCHEMA).read_text()) == json.loads(schema_text())
-        assert sorted(os.listdir(tmp_path)) == [MANUAL, SCHEMA]
-
-    def test_write_refuses_a_manual_without_marks(self, tmp_path):
-        (tmp_path / MANUAL).write_text("no marks here")
-        with pytest.raises(SystemExit, match=MANUAL):
-            TOOL["main"](tmp_path)
-        assert not (tmp_path / SCHEMA).exists()
-
     @pytest.mark.parametrize("study", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
     def test_studies_are_valid(self, study, validator):
         text = study.read_text()
@@ -251,16 +210,6 @@ class TestSchema:
         with pytest.raises(jsonschema.ValidationError):
             validator.validate(yaml.safe_load(text.replace(old, new, 1)))
 
-    @pytest.mark.parametrize("model", sections(study_model(kinds())).values())
-    def test_every_field_is_described(self, model):
-        assert model.__doc__
-        assert all(field.description for field in model.model_fields.values())
-
-    def test_every_section_is_in_the_manual(self):
-        models = {model.__name__ for model in sections(study_model(kinds())).values()}
-        defined = {name for name in json.loads(schema_text())["$defs"] if not name.endswith("_distribution")}
-        assert models == defined | {"StudyConfig"}
-
 
 @pytest.fixture(scope="module")
 def choices():
@@ -271,7 +220,6 @@ def choices():
     return beam, material, known, of_one_mesh.predict(beam, mesh, material, known)
 
 
-COUNTS = "105 particles, 268 springs"
 SAID = yaml.safe_load(Path(__file__).with_name("said.yaml").read_text())
 ABSURD = {name: refused_numbers(f"predict, absurd {name}") for name in ("beams", "sizes", "errors")}
 STEEL, RUBBER = ("--beam", "100x20", "--material", "steel"), ("--beam", "200x40", "--material", "rubber")
@@ -297,29 +245,6 @@ class TestPredict:
         write_mesh("own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
         result = run("predict", *shlex.split(call))
         assert result.exit_code == 0 and not [part for part in said if part not in result.stdout], result.stdout
-
-    def test_what_has_no_reference_says_so(self, choices):
-        beam, material, known, _ = choices
-        known = known | {"bending": "its error estimate is 1"}
-        mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-        found = of_one_mesh.predict(beam, mesh, material, known)
-        lines = prediction_text(beam_subject(beam, material, known), "", COUNTS, found).splitlines()
-        rows = [line for line in lines if line.startswith("  ")]
-        assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
-        assert "bending: no reference; its error estimate is 1" in lines
-
-    def test_unstable_networks_are_marked(self, choices):
-        beam, material, known, found = choices
-        numbers = dict.fromkeys(("young_modulus_error", "poisson_ratio"), np.nan)
-        numbers["errors"] = dict.fromkeys(of_one_mesh.CASES, np.nan)
-        failed = numbers | {"extra": "", "failures": {"patch test": "unstable: the network is unstable at rest"}}
-        found = [replace(one, **failed) if one.definition == "patch" else one for one in found]
-        ordered = sorted(found, key=lambda one: one.worst)
-        text = prediction_text(beam_subject(beam, material, known), "", COUNTS, ordered)
-        assert "with springs alone: van-gelder" in text
-        rows = {line.split()[0]: line for line in text.splitlines() if line.startswith("  ")}
-        assert rows["patch"].split()[-5:] == ["unstable"] * 5
-        assert "patch, patch test: unstable: the network is unstable at rest" in text
 
     def test_definitions_that_refuse_a_mesh_are_left_out(self, tmp_path):
         """Rectangles three times as long as high: springs along them would be negative."""
@@ -383,16 +308,6 @@ class TestPredictAMesh:
         assert "all finer meshes tried, up to twice as fine" in result.stdout and "linear kinematics" in result.stdout
         assert "A definition is given up if its error, by its change over the last doubling" in result.stdout
 
-    def test_none_is_said_and_nothing_written(self, tmp_path):
-        asked = ["--beam", "100x20", "--material", "rubber", "--error", "3 %", "--mesh", "right"]
-        target = tmp_path / "net.json"
-        result = run("predict", *asked, "--loads", "traction,shear", "--springs-alone", "--write", target)
-        assert "\nwith springs alone: none\n" in result.stdout
-        assert "right, with springs alone: none up to" in result.stdout and "nearest is" in result.stdout
-        assert "recommended" not in result.stdout and "with any definition" not in result.stdout
-        assert result.exit_code == 1 and not target.exists()
-        assert result.stderr == "Error: --write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
-
     def test_what_is_written_is_what_is_said(self, tmp_path):
         target = tmp_path / "net.json"
         said = run("predict", *self.FIND, "--write", target).stdout
@@ -446,11 +361,6 @@ class TestPredictAMesh:
         for ending in (*NET_FORMATS, ".xml", ".mjcf", ".scn", ".py", ".newton.py", ".xpbd.json"):
             assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
 
-    def test_work_is_counted(self):
-        with counted(MeshType.__call__, unit_reference, Sheet.__init__) as calls:
-            run("predict", *STEEL, "--size", "10 mm", "--loads", "shear")
-        assert calls == {"MeshType.__call__": 1, "unit_reference": 1, "Sheet.__init__": 1}
-
     @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
     @pytest.mark.parametrize(
         ("beam", "asked", "value"),
@@ -474,15 +384,3 @@ def test_no_way_of_writing_leaves_control_characters():
     Shown(stream).writelines(["red \x1b[31m\n"])
     assert stream.getvalue() == "red \\x1b[31m\n"
     assert not hasattr(Shown(sys.stdout), "buffer")
-
-
-def test_a_fault_of_the_system_without_a_file_is_told_without_one():
-    class One(Commands):
-        def get_command(self, ctx, name):
-            return click.Command(name, callback=full)
-
-    def full():
-        raise OSError(28, "No space left on device")
-
-    done = CliRunner().invoke(One(), ["any"])
-    assert (done.exit_code, done.output) == (1, "Error: [Errno 28] No space left on device\n")

@@ -166,8 +166,3 @@ def test_neither_a_beam_nor_a_shape(here):
     for command in (("predict",), ("springs", "--out", "net.csv")):
         result = run(*command)
         assert result.exit_code == 2 and "Missing option '--beam' such as 200x40, or '--study'" in result.stderr
-
-
-def test_a_study_without_shapes_says_so(here):
-    result = run("predict", "--study", f"{SHAPES.with_name('paper.yaml')}:plate")
-    assert result.exit_code == 2 and "names none of its shapes" in result.stderr

@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -150,14 +149,6 @@ class TestInfo:
         (tmp_path / "text.nc").write_text("text")
         refused(run("info", tmp_path / "text.nc"), "cannot be read")
 
-    def test_nothing_heavy_is_imported(self, path):
-        code = "import sys; from springtune.cli import main; main(standalone_mode=False); "
-        code += (
-            "print([m for m in ('scipy.sparse', 'matplotlib', 'bokeh', 'pydantic', 'snakemake') if m in sys.modules])"
-        )
-        done = subprocess.run([sys.executable, "-c", code, "info", path], capture_output=True, text=True, check=True)
-        assert done.stdout.splitlines()[-1] == "[]"
-
 
 class TestExport:
     def test_one_row_a_cell_that_was_asked_for(self, path, tmp_path):
@@ -170,14 +161,6 @@ class TestExport:
         assert first["particles"] == "100.0" and first["beam_length [m]"] == "0.2" and first["stiffness [N/m]"] == ""
         failed = next(row for row in rows if row["status"] == "failed")
         assert failed["displacement [m]"] == "" and failed["message"] == "springs gone"
-
-    def test_single_numbers_are_exported(self, tmp_path):
-        tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "0"}), "/benchmark": xr.Dataset()})
-        tree["benchmark"]["explicit_steps"] = xr.DataArray(3.0, attrs={"units": "s-1"})
-        tree.to_netcdf(tmp_path / "one.nc")
-        choice = ("--group", "benchmark")
-        assert run("export", tmp_path / "one.nc", "--to", tmp_path / "one.csv", *choice).exit_code == 0
-        assert (tmp_path / "one.csv").read_text().split() == ["explicit_steps", "[s-1]", "3.0"]
 
     @pytest.mark.parametrize("ending", ["csv", "parquet"])
     def test_parameters_come_along(self, tmp_path, ending):
@@ -208,15 +191,6 @@ class TestExport:
             [0.02, 0.1], [0.02, 0.2], [0.03, 0.3],
         ]  # fmt: skip
         assert [row["role"] for row in found] == ["x", "y", "x"]
-
-    def test_parquet_has_the_same_table(self, path, tmp_path):
-        import pyarrow.parquet
-
-        assert run("export", path, "--to", tmp_path / "cells.parquet").exit_code == 0
-        table = pyarrow.parquet.read_table(tmp_path / "cells.parquet")
-        assert table.num_rows == 8 and "displacement [m]" in table.column_names
-        assert table.column("displacement [m]").null_count == 2
-        assert set(table.column("status").to_pylist()) == {"solved", "not_converged", "failed"}
 
     def test_a_file_that_is_there_is_kept_unless_forced(self, path, tmp_path):
         (tmp_path / "cells.csv").write_text("mine")

@@ -17,7 +17,6 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
-from springtune.scene.sheet import definition_of
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import load_study
 
@@ -115,17 +114,6 @@ def test_catalogue_has_every_definition(catalogue):
     assert loaded == [pair for pair in supported if pair not in never]  # on rows made for it alone; none is printed
 
 
-def test_a_definition_without_a_source_is_named(catalogue):
-    def bare(mesh, material, thickness):
-        """Springs of hearsay.
-
-        Source: hearsay (heard).
-        """
-
-    with pytest.raises(SystemExit, match="'bare': its docstring has no source; add a paragraph"):
-        catalogue[0]["source"](definition_of(bare))
-
-
 @pytest.mark.slow
 def test_numbers_of_the_catalogue_are_those_of_the_code(catalogue):
     """To the digit that rounding leaves; searches end elsewhere on other machines."""
@@ -155,14 +143,6 @@ def test_commands_of_the_readme_bring_springs_into_mujoco(tmp_path, monkeypatch)
     written = CliRunner().invoke(main, write[1:])
     assert written.exit_code == 0, written.output
     assert mujoco.MjModel.from_xml_path(view[-1].removeprefix("--mjcf=")).nsite == 252
-
-
-def test_study_of_the_readme_is_one(tmp_path):
-    (text,) = blocks("yaml")
-    assert len(text.splitlines()) <= 10
-    path = tmp_path / "mine.yaml"
-    path.write_text(text)
-    assert len(load_study(path).scenes) == 8
 
 
 # -- what pages tell to type -------------------------------------------------------------------------------------------

@@ -2,12 +2,10 @@
 
 import importlib.util
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
-from packaging.requirements import Requirement
 
 import springtune
 
@@ -24,15 +22,6 @@ def licences():
 
 def test_the_table_is_what_the_lock_files_ask_for(licences):
     licences.main(check=True)
-
-
-def test_each_dependency_says_what_it_is_for(licences):
-    """A row each: name, use, MB, what it brings, what would replace it."""
-    section = licences.PAGE.read_text().partition("## What each dependency is for")[2].partition("\n## ")[0]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line[:2] == "| "]
-    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-    assert [name for name, *_ in rows[1:]] == [Requirement(one).name for one in project["dependencies"]]
-    assert all(use and float(megabytes) > 0 and instead for _, use, megabytes, _, instead in rows[1:])
 
 
 def test_the_gpl_comes_with_one_extra_only(licences):
@@ -52,10 +41,3 @@ VERSION, DATE = re.search(r"^## (\S+) \((.*)\)$", (REPOSITORY / "CHANGELOG.md").
 def test_version_of_citation_and_changelog():
     assert CITATION["version"] == VERSION == springtune.__version__
     assert re.fullmatch(r"\d+\.\d+\.\d+", VERSION)
-
-
-def test_a_release_has_its_date_in_both():
-    """`(unreleased)` until it is released; then the day, and CITATION.cff has the same."""
-    released = str(CITATION.get("date-released", "unreleased"))
-    assert released == DATE
-    assert DATE == "unreleased" or re.fullmatch(r"\d{4}-\d{2}-\d{2}", DATE)

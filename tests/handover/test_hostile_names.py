@@ -71,18 +71,3 @@ def test_data_give_a_name_back(ending, name, plain, tmp_path):
     back = st.SpringNet.read(tmp_path / f"net{ending}")
     assert back.header == net.header and (back.stiffness == net.stiffness).all()
     assert print(back) is None and back._repr_html_()  # as a notebook has it
-
-
-@pytest.mark.parametrize("ending", formats.READERS)
-def test_a_file_may_have_any_name(ending, plain, tmp_path):
-    path = tmp_path / f"a\nb\r\u2028c # {ending}"
-    plain.write(path)
-    assert st.SpringNet.read(path).header == plain.header
-
-
-def test_a_table_with_names_as_they_are_reads_back(plain, tmp_path):
-    path = tmp_path / "net.csv"
-    net = replace(plain, header=renamed(plain.header, "a\u2028b\x85c"))
-    net.write(path)
-    path.write_text(path.read_text().replace("\\u2028", "\u2028").replace("\\u0085", "\x85"))
-    assert st.SpringNet.read(path).header == net.header

@@ -13,7 +13,6 @@ from mechanics import spring_forces
 from springtune.handover.net import SpringNet
 from springtune.handover.simulation import STEP_SHARE, EquilibriumWarning
 from springtune.mesh import Mesh, signed_areas
-from springtune.problem.geometry import AssumptionWarning
 from springtune.springs import DEFINITIONS
 
 from problems import pulled
@@ -412,15 +411,6 @@ def test_sofas_scene_in_python_is_that_in_xml(tmp_path):
     assert root.dt.value == float(nodes[0]["dt"]) and root.gravity.value == [0, 0, 0]
 
 
-def test_sofas_scene_in_python_serves_versions_with_other_names(tmp_path):
-    """Since v26.06 the integrator is another component of another plugin."""
-    text = written(scene(), tmp_path, ".py")
-    swapped = text.replace("EulerImplicitSolver", "?").replace("EulerImplicitIntegrationScheme", "EulerImplicitSolver")
-    found, _ = as_python_scene(swapped.replace("?", "EulerImplicitIntegrationScheme"))
-    assert "EulerImplicitSolver" in found
-    assert {"pluginName": "Sofa.Component.IntegrationScheme.Backward"} in found["RequiredPlugin"]
-
-
 # -- XPBD --------------------------------------------------------------------------------------------------------------
 
 
@@ -460,20 +450,6 @@ def unstable(mesh, material, thickness):
 def test_springs_that_are_unstable_at_rest_are_refused(tmp_path):
     with pytest.raises(ValueError, match="definition 'unstable': is unstable at rest, .* in MuJoCo; take another"):
         scene(definition=unstable).springs.write(tmp_path / "net.xml", errors=False)
-
-
-def test_files_for_simulators_are_not_read(tmp_path):
-    [path] = scene().springs.write(tmp_path / "net.xml", errors=False)
-    with pytest.raises(ValueError, match=r"it is for MuJoCo; read the springs from \.csv, \.json$"):
-        SpringNet.read(path)
-
-
-def test_particles_too_light_for_mujoco_are_refused(tmp_path):
-    with pytest.warns(AssumptionWarning, match="1e-06 m, less than 10 um"):
-        beam = st.Beam("1 um", "0.5 um", thickness="1 nm")
-    one = st.Scene(beam, st.make_mesh(beam, "structured", "0.1 um"), STEEL, "traction", "1 nN", definition="lattice")
-    with pytest.raises(ValueError, match="masses: the least one is .* kg, and MuJoCo takes 1e-15 kg and more; take"):
-        one.springs.write(tmp_path / "net.xml", errors=False)
 
 
 def test_a_load_without_equilibrium_or_with_one_far_away_is_written_and_says_so(tmp_path):

@@ -1,8 +1,5 @@
 """What a bad study and a bad mesh file cost, whichever door they come through."""
 
-import subprocess
-import sys
-
 import meshio
 import numpy as np
 import pytest
@@ -11,15 +8,6 @@ import springtune as st
 from springtune.mesh import write_mesh
 
 from tables import STUDIES
-
-
-def test_run_passes_on_what_is_snakemakes(repository, tmp_path):
-    """From anywhere."""
-    command = [sys.executable, "-m", "springtune", "run", str(repository / "config/quick.yaml"), "--list-rules"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0 and "collect" in done.stdout.split()
-    assert [path.name for path in tmp_path.iterdir()] == [".snakemake"]
-
 
 FILES = STUDIES["bad_studies_files"]
 
@@ -62,21 +50,3 @@ def test_a_bad_mesh_file_costs_its_own_scenes_alone(run):
         found = tree.to_dataset().squeeze(drop=True)
         assert (found.status.sel(mesh_type="cut") == st.Status.SOLVED).all()
         np.testing.assert_array_equal(found.displacement.sel(mesh_type="cut"), found.displacement.sel(mesh_type="good"))
-
-
-def test_a_run_with_holes_says_a_line_for_each_stage(tmp_path, repository):
-    for name in ("Snakefile", "profiles", "workflow"):
-        (tmp_path / name).symlink_to(repository / name)
-    grid = "{beam: a, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1e12 N"
-    head = FILES[: FILES.index("mesh_files")]
-    text = f"{head}outputs: tables\ngrids:\n  all: {grid}, definition: lattice, sensitivity: false}}\n"
-    (tmp_path / "hole.yaml").write_text(text)
-
-    def run(*arguments):
-        command = [sys.executable, "-m", "springtune", "run", "hole.yaml", "--until", "collect", *arguments]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-        return done.returncode, done.stdout + done.stderr
-
-    code, text = run()
-    assert code == 0, text
-    assert "Select jobs" not in text and text.count("\nmesh: done; ") == 1

@@ -105,15 +105,6 @@ def same(found, wanted):
     assert not differing and found.keys() == wanted.keys(), f"{len(differing)}: {differing[:10]}"
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4))])
-def test_order_does_not_matter(study, usual, tmp_path, seed):
-    generator = random.Random(seed)
-    for module, content in stages(study, tmp_path):
-        # A mean is taken in the order of a study's values, which are sorted.
-        compute(module, content if module.endswith("calibrate") else shuffled(content, generator))
-    same(results(tmp_path), usual)
-
-
 def test_what_was_stored_before_does_not_matter(study, usual, tmp_path):
     """A random half of the tasks of each job first; then a few at a time; then all that is left."""
     generator = random.Random(0)

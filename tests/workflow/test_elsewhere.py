@@ -52,18 +52,3 @@ def test_a_folder_that_results_cannot_be_in_is_refused(run):
     assert code == 1 and "Traceback" not in output, output
     assert r"/\udcfc': not UTF-8, as texts of results are; rename the file or folder" in output
     assert not (folder / "results").exists()
-
-
-def test_a_folder_of_another_study_is_refused(run):
-    """Before anything is computed."""
-    run.write("elsewhere.yaml", STUDY)
-    (run.folder / "w").mkdir()
-    run.write("w/elsewhere.yaml", STUDY.replace("20 kN", "30 kN"))
-    locks.claim(run.folder / "results/elsewhere", run.folder / "w/elsewhere.yaml")
-    before = run.times("results/**/*")
-    code, output = run.snakemake("elsewhere.yaml")
-    assert code == 1 and "holds the results of w/elsewhere.yaml, another study of the same name; rename" in output
-    assert "Traceback" not in output and run.times("results/**/*") == before
-    (run.folder / "w/elsewhere.yaml").unlink()
-    code, output = run.snakemake("elsewhere.yaml", "-n")
-    assert code == 0, output

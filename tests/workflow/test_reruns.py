@@ -4,10 +4,6 @@ Mostly by the study's jobs in this process, which tests/reruns finds to be those
 """
 
 import contextlib
-import json
-import os
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -40,47 +36,12 @@ def grown(run):
     return run
 
 
-def test_only_what_is_new_is_computed(grown, monkeypatch):
-    run = grown
-    monkeypatch.chdir(run.folder)
-    stored = "results/grow/[mcs]*s/*_*mm.*"
-    before = run.times(stored)
-    assert len(before) == 2 * 4  # mesh and notes, curves, solutions
-
-    run.write("grow.yaml", study("10 mm, 5 mm, 4 mm"))
-    campaign = Campaign("grow.yaml")
-    records = [campaign.jobs[name].record for name in campaign.finish("collect") if name.startswith("solve")]
-    assert sum(json.loads(record.read_text())["computed"] for record in records) == 2
-    after = run.times(stored)
-    assert {name: after[name] for name in before} == before
-    assert len(after) == 3 * 4
-    assert dataset(run, "grow").mesh_size.values.tolist() == [4e-3, 5e-3, 10e-3]
-
-    # Back to the old grid: nothing is solved, and the removed size is gone from the dataset.
-    run.write("grow.yaml", study())
-    Campaign("grow.yaml").finish("collect")
-    assert run.times(stored) == after
-    assert dataset(run, "grow").mesh_size.values.tolist() == [5e-3, 10e-3]
-
-
 def test_a_dry_run_lists_what_snakemake_has_no_notes_of(grown):
     """As after results were copied from elsewhere: here no job was Snakemake's."""
     grown.write("grow.yaml", study(force="30 kN"))
     code, listed = grown.springtune("grow.yaml", "-n", "--cores", "1")
     grown.write("grow.yaml", study())
     assert code == 0 and {"sensitivity", "solve", "collect"} <= set(listed.split()), listed
-
-
-def test_a_deleted_result_is_made_again(grown):
-    """Whatever the times of the others: a clock that is set back leaves them in the future."""
-    lost = grown.folder / "results/grow/solutions/50x20_structured_10mm.h5"
-    lost.unlink()
-    future = time.time() + 1e6
-    for path in filter(Path.is_file, grown.folder.rglob("results/grow/**/*")):
-        os.utime(path, (future, future))
-    code, output = grown.springtune("grow.yaml", "--until", "collect")
-    assert code == 0, output
-    assert lost.exists()
 
 
 def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):

@@ -1,10 +1,7 @@
 """What a run survives, and what it says: other runs, kills, broken programs."""
 
 import contextlib
-import fcntl
 import os
-import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,9 +11,6 @@ from pathlib import Path
 import psutil
 import pytest
 import xarray as xr
-
-import springtune
-from springtune.studies.runs import store
 
 from campaigns import Campaign
 from tables import STUDIES
@@ -50,26 +44,6 @@ def test_who_only_looks_changes_nothing(finished):
     assert everything(finished.folder) == before
 
 
-def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
-    """As Snakemake writes locks, of the study's collect; others are in tests/studies/runs/test_locks.py."""
-    locks = finished.folder / ".snakemake/locks"
-    locks.mkdir(parents=True, exist_ok=True)
-    (locks / "0.output.lock").write_text(f"{finished.folder}/results/survival/dataset.nc\n")
-    (finished.folder / "results/survival/index.html").unlink()
-    (finished.folder / "results/survival/tasks/run.json").write_text("{}")
-    code, output = finished.springtune("survival.yaml")
-    assert code == 0 and "was killed and left its lock; the lock is removed" in output, output
-    assert (finished.folder / "results/survival/index.html").exists()
-
-
-def test_a_study_that_another_process_computes_is_left_to_it(finished):
-    with (finished.folder / "results/survival/tasks/run.json").open("a+") as note:
-        fcntl.flock(note, fcntl.LOCK_EX)
-        code, output = finished.springtune("survival.yaml")
-    assert code == 1 and "Traceback" not in output
-    assert "results/survival: another process computes it" in output
-
-
 def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     """Wherever it is: the kill comes when the first mesh is there."""
     run = finished
@@ -93,23 +67,6 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     ):
         assert one.displacement.equals(other.displacement) and one.stiffness.equals(other.stiffness)
     assert not list(run.folder.rglob("*.unfinished"))
-
-
-def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp_path):
-    """The package in a copy, with an error that scenes in traction run into."""
-    line = "        problem, first = sheet.problem(self.loading, springs), self.case.quantities[0]\n"
-    shutil.copytree(Path(springtune.__file__).parent, tmp_path / "springtune")
-    path = tmp_path / "springtune/scene/statements.py"
-    assert path.read_text().count(line) == 1
-    path.write_text(path.read_text().replace(line, f"{line}        None if self.force < 0 else None + self.force\n"))
-    run.write("broken.yaml", STUDY)
-    code, output = run.snakemake("broken.yaml", package=tmp_path)
-    assert code == 1 and "Traceback" not in output
-    broken = re.findall(r"\n  (\d) of this job's tasks could not be done: TypeError: unsupported op", output)
-    assert sum(map(int, broken)) == 4, output
-    assert "Traceback" in (run.folder / "results/broken/logs/solve_0.log").read_text()
-    assert not (run.folder / "results/broken/dataset.nc").exists()
-    assert len(store.stored(run.folder / "results/broken/solutions/50x20_structured_5mm.h5")) == 2
 
 
 def test_a_study_that_is_edited_during_its_run_makes_no_dataset_of_another_one(run):

@@ -1,8 +1,5 @@
 """Grids: ranges, rows of a file, and what is swept."""
 
-import itertools
-import math
-
 import numpy as np
 import pytest
 import yaml
@@ -14,7 +11,6 @@ from springtune.problem.parameters import MOST_SCENES_VARIABLE, SWEPT
 from springtune.studies.config.fields import spaced
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
-from springtune.studies.output.selection import at, last_swept
 
 from campaigns import Campaign
 from tables import STUDIES, refused_files
@@ -83,34 +79,7 @@ class TestRanges:
         assert study.axes["mesh_size"] == (1e-3, 1.5e-3, 2e-3, 2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3, 5e-3)
 
 
-NUMBERS = {
-    "mesh_size": ["2 mm", "5 mm", "10 mm"],
-    "force": ["1 N", "2 N", "3 N"],
-    "thickness": ["1 mm", "2 mm", "3 mm"],
-}
-
-
 class TestCombinations:
-    @given(st.permutations(list(NUMBERS)), st.integers(0, 3))
-    def test_rows_go_together_and_the_rest_is_a_product(self, tmp_path_factory, names, number):
-        path, rows = tmp_path_factory.mktemp("grid") / "study.yaml", names[:number]
-        grid = GRID | {key: values for key, values in NUMBERS.items() if key not in rows}
-        if rows:
-            grid = {key: value for key, value in grid.items() if key not in rows} | {"rows": "rows.csv"}
-            lines = [rows, *zip(*(NUMBERS[name] for name in rows))]
-            path.with_name("rows.csv").write_text("".join(f"{','.join(line)}\n" for line in lines))
-        path.write_text(HEAD + grid_text(grid))
-        found = {(scene.mesh.mesh_size, scene.force, scene.mesh.beam.thickness) for scene in load_study(path).scenes}
-        places = itertools.product(range(3), repeat=3)
-        order = list(NUMBERS)
-        wanted = {
-            tuple([2e-3, 5e-3, 10e-3][p] if n == "mesh_size" else [1e0, 2e0, 3e0][p] * (1e-3 if n == "thickness" else 1)
-                  for n, p in zip(order, place))
-            for place in places
-            if len({place[order.index(name)] for name in rows}) <= 1
-        }  # fmt: skip
-        assert found == wanted
-
     def test_forces_of_each_beam_go_with_it(self, load):
         forces = {"long": {"from": "1 N", "to": "3 N", "points": "3"}, "short": "10 N"}
         study = load(beam=["long", "short"], force=forces)
@@ -161,19 +130,10 @@ class TestSwept:
         # In place of the beam's own, so that the label has to say which.
         assert load(thickness="2 mm").swept == ("thickness",)
 
-    def test_two_forces_of_one_grid_are_a_sweep(self, load):
-        head = HEAD + grid_text(GRID) + "  two:\n"
-        assert load(head, force=["1 kN", "2 kN"]).axes["force"] == (1e3, 2e3)
-
     def test_forces_of_two_grids_on_one_beam_in_one_load_are_a_sweep(self, load):
         head = HEAD + grid_text(GRID) + "  two:\n"
         assert load(head, force="2 kN").axes["force"] == (1e3, 2e3)
         assert load(head, force="2 kN", load="bending").swept == ()
-
-    def test_another_beam_than_the_calibrating_one_may_have_two_forces(self, load):
-        head = HEAD.replace("grids:", "definitions: {calibrated: {beam: long, load: traction}}\ngrids:")
-        grid = {"beam": ["long", "short"], "definition": ["calibrated", "lattice"]}
-        assert load(head, **grid, force={"long": "1 N", "short": ["1 N", "2 N"]}).swept == ("force",)
 
     def test_moduli_are_those_of_the_swept_ratios(self, load):
         study = load(poisson_ratio=["0.1", "0.2"], moduli="true")
@@ -281,22 +241,6 @@ def test_figures_show_the_last_values_and_say_which(swept):
         springtune.plot_sweep(tree, parameter="height")
 
 
-def test_what_is_shown_is_of_each_beam_material_and_load(swept):
-    tree, _, _ = swept
-    root = tree.to_dataset()
-    present = (root.status != 0) & ~((root.force == 125.0) & (root.thickness > 2e-3))
-    values = last_swept(present)
-    assert {name: float(value.squeeze()) for name, value in values.items()} == {
-        "force": 125.0, "thickness": 1e-3, "young_modulus": 2e9, "poisson_ratio": 0.5, "stiffness_scale": 1.0
-    }  # fmt: skip
-    shown = at(root, values)
-    assert not set(SWEPT) & set(shown.dims)
-    assert float(shown.force.squeeze()) == 125.0
-    assert float(shown.beam_thickness.sel(beam="long")) == 1e-3
-    assert math.isfinite(float(shown.reference_displacement.squeeze()))
-    assert last_swept(present.isel(dict.fromkeys(SWEPT, 0))) == {}
-
-
 def test_tables_have_a_row_of_each_value(swept):
     from springtune.studies.kinds.bodies.tables import tables
 
@@ -347,58 +291,10 @@ def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
         assert traction.deformation_error.values == pytest.approx([float(traction.deformation_error[0])] * 2, rel=1e-9)
 
 
-def test_who_needs_a_field_has_it_whoever_asks_first(here):
-    """Traction and compression share unit problems: one grid has enough for an interpolant, the other needs fields."""
-    many = {"load": "compression", "force": "1 kN", "definition": "uniform", "mesh_size": "10 mm"}
-    many |= {"poisson_ratio": {"from": "0.01", "to": "0.49", "points": "49"}}
-    fitted = {"load": "traction", "force": "1 kN", "definition": ["annealed", "lattice"], "mesh_size": "10 mm"}
-    study = of_grids(here, "fields", [many, fitted | {"poisson_ratio": ["0.2", "0.3"]}])
-    with Campaign(study).collected() as tree:
-        root = tree.to_dataset().squeeze(drop=True)
-        asked = root.where(root.status != 0)
-        assert int((root.status > 1).sum()) == 0
-        interpolated = asked.sel(load="compression", definition="uniform")
-        # Those that share a unit problem with a solved one are solved with it.
-        solved = interpolated.poisson_ratio.values[interpolated.field_error.notnull().values]
-        assert set(np.round(solved, 2)) == {0.2, 0.3}
-        assert int(interpolated.reference_displacement.notnull().sum()) == 49
-
-
-def test_what_is_interpolated_is_no_part_of_what_a_network_depends_on(here):
-    """Another range of Poisson's ratio is another interpolant, and the same networks."""
-    from springtune.studies.kinds.bodies.plan import scene_tasks
-
-    keys = []
-    for last, points in (("0.4", "61"), ("0.45", "71")):
-        grid = {"load": "traction", "force": "1 kN", "poisson_ratio": {"from": "0.1", "to": last, "points": points}}
-        study = load_study(of_grids(here, "keys", [grid]))
-        keys.append({task["key"] for tasks in scene_tasks(study).values() for task in tasks})
-    assert keys[0] <= keys[1]
-
-
 def test_forces_of_equal_products_are_one_label(here):
     grid = {"load": "pressure", "pressure": ["2 MPa", "3 MPa"], "thickness": ["1 mm", "1.5 mm"]}
     study = load_study(of_grids(here, "press", [grid], beams={"60x20": {"length": "70 mm", "height": "20 mm"}}))
     assert study.axes["force"] == (140.0, 210.0, 315.0)
-
-
-def test_what_goes_with_the_mesh_size_is_shown_on_its_own_meshes(here):
-    (here / "rows.csv").write_text("mesh_size,force\n10 mm,1 kN\n5 mm,10 kN\n")
-    grid = {"load": "traction", "rows": "rows.csv", "mesh_size": None}
-    path = of_grids(here, "paired", [grid], outputs=["deformed", "size", "sweep"])
-    Campaign(path).finish()
-    with springtune.open("results/paired") as tree:
-        assert np.isfinite(tree["fields"].displacement_x.values).any()
-        (panel,) = springtune.plot_size(tree, kinematics="linear")
-        errors = tree.deformation_error.squeeze(drop=True)
-        wanted = [100 * float(errors.sel(mesh_size=size, force=force)) for size, force in ((5e-3, 1e4), (10e-3, 1e3))]
-        lines = {line.get_label(): line for line in panel.lines}
-        assert lines["lattice"].get_ydata() == pytest.approx(wanted)
-        assert "1\u00a0kN to 10\u00a0kN" in panel.get_title(loc="left").replace("\n", " ")
-        (panel,) = springtune.plot_sweep(tree, parameter="force", kinematics="linear")
-        lines = {line.get_label(): line for line in panel.lines}
-        assert lines["lattice"].get_ydata() == pytest.approx(wanted[::-1])
-        assert "mesh 5 to 10\u00a0mm" in panel.get_title(loc="left").replace("\n", " ")
 
 
 def test_fields_of_a_sweep_say_of_which_values_they_are(here):

@@ -67,40 +67,11 @@ class TestExpansion:
         assert study.printed == ()
         assert study.printed_path is None
 
-    def test_about_itself(self, load, tmp_path):
-        study = load(SMALL, "my-study.yaml")
-        assert (study.name, study.title, study.text) == ("my-study", "A small study", SMALL)
-        assert study.path == tmp_path / "my-study.yaml"
-
-    def test_axes_hold_what_is_used_in_declared_order(self, load):
-        assert load(SMALL).axes == {
-            "beam": ("long", "short"),
-            "mesh_type": ("structured", "free"),
-            "mesh_size": (0.002, 0.005),
-            "material": ("steel",),
-            "load": ("traction", "compression"),
-            "definition": ("paper", "calibrated", "lattice"),
-            "kinematics": ("nonlinear", "linear"),
-        }
-
-    def test_names(self, load):
-        study = load(changed(("[2 mm, 5 mm]", "[0.5 mm, 5 mm]")))
-        assert mesh_name(study.meshes[0]) == "long_structured_0.5mm"
-        assert [*study.labels(study.scenes[0]).values()] == [
-            "long", "structured", 5e-4, "steel", "traction", "paper", "nonlinear"
-        ]  # fmt: skip
-        assert len(set(map(mesh_name, study.meshes))) == len(study.meshes)
-        assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == len(study.scenes)
-
     def test_stiffness_ratios(self, load):
         assert len(load(SMALL).stiffness_ratios) == 61
         ratios = load(changed(("grids:", "sensitivity: {from: 0.5, to: 1, points: 3}\ngrids:"))).stiffness_ratios
         assert ratios == pytest.approx([0.5 * LATTICE, 0.75 * LATTICE, LATTICE], rel=1e-9)
         assert all(type(ratio) is float for ratio in ratios)
-
-    def test_equal_lengths_in_other_units_are_one_mesh(self, load):
-        text = changed(("mesh_size: 5 mm", "mesh_size: 0.5 cm"))
-        assert len(load(text).meshes) == 8
 
     def test_a_scene_of_two_grids_is_one_scene(self, load):
         twice = SMALL + SMALL.partition("grids:\n")[2].replace("pull:", "pull2:").replace("push:", "push2:")
@@ -108,12 +79,6 @@ class TestExpansion:
         for name in ("meshes", "scenes", "curves", "references", "axes"):
             assert getattr(once, name) == getattr(again, name)
         assert len(again.grids) == 4
-
-    def test_merge_keys(self, load):
-        text = SMALL.replace("  push:", "  push: &push") + "  push free:\n    <<: *push\n    mesh_type: free\n"
-        grid = load(text).grids[-1]
-        assert [mesh_name(scene.mesh) for scene in grid.scenes] == ["short_free_5mm"]
-        assert not grid.curves
 
     def test_names_are_texts_whatever_yaml_makes_of_them(self, load):
         assert load(SMALL.replace("short", "1e3").replace("long", "no")).axes["beam"] == ("no", "1e3")
@@ -132,12 +97,6 @@ class TestCalibrationCurves:
         text = text.replace("definition: lattice", "definition: calibrated\n    kinematics: linear")
         curves = [curve for curve in load(text).curves if curve.kinematics == "linear"]
         assert [mesh_name(curve.mesh) for curve in curves] == ["long_structured_2mm", "long_structured_5mm"]
-
-    def test_none_without_need(self, load):
-        text = SMALL.replace("calibrated, ", "").replace(
-            "    kinematics: [nonlinear, linear]", "    sensitivity: false"
-        )
-        assert load(text).curves == ()
 
 
 AXES = {
@@ -211,10 +170,6 @@ def study():
 
 
 class TestPaper:
-    def test_counts(self, study):
-        counted = [len(items) for items in (study.meshes, study.scenes, study.curves, study.references)]
-        assert counted == [18, 45 * (3 * 2 + 2), 45 * 2, 9 + 6 - 6]
-
     def test_printed_cells_are_the_cells_of_the_grids(self, study):
         cells = {(s.mesh.beam.name, s.mesh.mesh_type, s.mesh.mesh_size, s.material.name, s.load) for s in study.scenes}
         printed = {(c.beam, c.mesh_type, c.mesh_size, c.material, c.load) for c in study.printed}
@@ -292,17 +247,8 @@ class TestDefinitions:
         study = load(changed(("    kinematics: [nonlinear, linear]\n", "    moduli: true\n")))
         assert {labels["definition"] for labels in study.parts["moduli"][1]} == {"lattice"}
 
-    def test_no_moduli_without_asking(self, load):
-        study = load(SMALL)
-        assert study.parts["moduli"] is None
-        assert study.outputs == ("sensitivity", "size", "deformed", "sweep", "tables", "shapes")
-
 
 # -- bad input ---------------------------------------------------------------------------------------------------------
-
-
-def test_a_folded_text_of_one_line_is_one(load):
-    assert load(changed(("title: A small study", "title: >\n  A small\n  study"))).title == "A small study"
 
 
 def test_lines_of_a_table_are_lines(refusal, tmp_path):
@@ -411,15 +357,6 @@ class TestPressureAndLaying:
 
 
 # -- the benchmark -----------------------------------------------------------------------------------------------------
-
-
-class TestBenchmark:
-    def test_sizes_are_those_of_the_study(self, load):
-        text = study_text("benchmark", ("\ngrids", "\n  finest: 5 mm\n  finest_of: {condensation: 2 mm}\ngrids"))
-        (scene,) = load(text).parts["benchmark"].values()
-        assert dict(zip(scene["approaches"], scene["finest"]))["condensation"] == 2e-3
-        assert {size for name, size in zip(scene["approaches"], scene["finest"]) if name != "condensation"} == {5e-3}
-        assert all({*one["finest"]} == {2e-3} for one in load(STUDIES["benchmark"]).parts["benchmark"].values())
 
 
 HERE = Path(__file__).parent

@@ -4,7 +4,6 @@ import csv
 import faulthandler
 import importlib
 import os
-import re
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ import xarray as xr
 
 import springtune as st
 from springtune.studies.kinds.engines import RUN_ENDS
-from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
 from springtune.studies.kinds.engines.kind import KIND
 from springtune.studies.output.comparison import compare
 from springtune.studies.runs import keys
@@ -203,14 +201,6 @@ def test_errors_are_the_sum_of_their_parts_and_times_are_measured(collected):
     assert not compare(*(xr.DataTree.from_dict({"/engines": one}) for one in (data, later))).different
 
 
-def test_a_crash_loses_one_run_and_what_is_stored_is_kept(collected):
-    text = STUDY.replace("dt: [1/60 s, 5 ms]", "dt: 5 ms")
-    data = collected("aborting", text=text)["engines"].to_dataset().squeeze()
-    assert {RUN_ENDS[flag] for flag in data.engine_status.sel(substeps=1).values} == {"failed"}
-    assert {RUN_ENDS[flag] for flag in data.engine_status.sel(substeps=4).values} == {"rest"}
-    assert not stages_due()
-
-
 def test_the_best_factor_gives_the_references_displacement(collected):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "iterations: 7")
     curve = CURVE.replace("0.5, to: 8, points: 5", "0.01, to: 100, points: 4").replace("[2, 50]", "[1, 50]")
@@ -268,25 +258,6 @@ def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(colle
 
 # -- what is drawn -----------------------------------------------------------------------------------------------------
 
-PLOTS = {"engines": (st.plot_engine_errors, st.plot_engine_maps), "engine_curves": (st.plot_engine_curves,)}
-
-
-@pytest.mark.parametrize("names", [("missing",), ("exploding", "creeping"), ("toy", "swinging")])
-def test_figures_say_what_they_lack(collected, names):
-    text = STUDY.replace("dt: [1/60 s, 5 ms]", "dt: 5 ms") + CURVE
-    tree = collected(*names, text=text)
-    for group, plots in PLOTS.items():
-        for plot in plots:
-            panels = np.ravel(np.asarray(plot(tree[group].to_dataset()), dtype=object))
-            said = " ".join(text.get_text() for panel in panels for text in panel.texts)
-            if "toy" in names:
-                assert any(panel.has_data() for panel in panels)
-            else:
-                lost = {"missing": "absent", "exploding": "diverged"}[names[0]]
-                assert lost in re.sub(r"\s+", " ", said) or "curves have no" in said or plot is st.plot_engine_maps
-    with pytest.raises(ValueError, match="nothing has scene 'push'"):
-        st.plot_engine_maps(tree, scene="push")
-
 
 def test_outputs_are_figures_of_each_scene_and_a_table(collected):
     text = STUDY.replace("[1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "[1, 100]")
@@ -300,9 +271,3 @@ def test_outputs_are_figures_of_each_scene_and_a_table(collected):
     assert [row["engine_status"] for row in rows] == ["absent"] * 2 + ["rest"] * 2
     assert rows[0]["error_percent"] == "" and float(rows[2]["error_percent"]) > float(rows[3]["error_percent"]) > 0
     assert "Scenes in engines" in (campaign.folder / "tables/index.html").read_text()
-
-
-def test_the_groups_have_units_and_names():
-    for group in (ENGINE_RUNS, ENGINE_CURVES):
-        for dimensions, units, long_name, _ in group.variables.values():
-            assert units and long_name and set(dimensions) <= {"scene", "definition", *group.dimensions}

@@ -1,20 +1,16 @@
 """Rubber of a uniaxial test in a study: read, refused by its line, part of the keys, compared by its own law."""
 
-import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import springtune as st
-from springtune.problem.materials import material_of
 from springtune.studies.kinds.bodies import plan
 from springtune.studies.kinds.bodies.errors import like_with_like
 from springtune.studies.kinds.moduli.outputs import tables
-from springtune.studies.runs.keys import material_key
 from springtune.studies.runs.provenance import inputs
 
 from campaigns import Campaign, load_text
@@ -69,12 +65,6 @@ def test_a_test_is_part_of_the_keys_of_what_is_stored(here):
     assert not keys(STUDY.replace("{uniaxial_test", "{terms: 2, uniaxial_test")) & first
     file.write_text(file.read_text().replace("1.9,0.5001", "1.9,0.51"))
     assert not keys() & first
-
-
-def test_a_task_has_the_material():
-    rubber = st.fit_rubber(TRELOAR / "uniaxial.csv", density="930 kg/m^3", name="treloar")
-    read = material_of(json.loads(json.dumps(material_key(rubber, density=True))))
-    assert replace(read, name="treloar", test_errors=rubber.test_errors) == rubber
 
 
 def test_networks_are_compared_with_the_law_of_their_material(here):

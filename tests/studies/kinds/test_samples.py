@@ -18,7 +18,7 @@ from springtune.reference.answers import unit_scales
 from springtune.reference.small_strain import solve_unit
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
-from springtune.studies.kinds.samples import designs, interpolate, solve
+from springtune.studies.kinds.samples import designs, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.figures import plot_sobol
@@ -96,18 +96,6 @@ class TestDesigns:
         together = designs.draw(design, 3, self.PARAMETERS, 0, 256)
         for name, values in together.items():
             assert np.concatenate([part[name] for part in parts]).tobytes() == values.tobytes()
-
-    @pytest.mark.parametrize("design", DESIGNS)
-    def test_tasks_of_half_the_size_are_the_first_ones(self, design):
-        for size in (8, 64, 512, 4096):
-            half, whole = blocks(design, size), blocks(design, 2 * size)
-            assert whole[: len(half)] == half
-            assert half[-1][1] == size
-
-    def test_seeds_and_rows_differ(self):
-        one, other = (designs.draw("sobol", seed, self.PARAMETERS, 0, 8)["length"] for seed in (1, 2))
-        assert not (one == other).any()
-        assert len(np.unique(one)) == 8
 
     def test_values_follow_their_distributions(self):
         """Scrambled Sobol points have one value in each of as many strata."""
@@ -215,11 +203,6 @@ class TestOnce:
             answers += [sheet.solve(kind, springs, 1e-4, how).displacement for how in ("linear", "nonlinear")]
         assert answers[:2] == answers[2:]
         assert sheet.mesh.edges is before.mesh.edges
-
-    def test_a_sheet_of_other_cells_takes_nothing_over(self):
-        before = Sheet(MESH_TYPES["structured"](0.1, 0.04, 0.01), 1.0)
-        sheet = Sheet(MESH_TYPES["right"](0.1, 0.04, 0.01), 1.0, like=before)
-        assert sheet.mesh.edges is not before.mesh.edges
 
     def test_sampled_scenes_are_those_of_a_sheet_each(self, linear):
         data = linear["samples"].to_dataset()
@@ -369,29 +352,6 @@ class TestFailures:
         assert all("negative pivot" in text for text in messages)
         assert "left out" in tree["sobol"].attrs["failures"]
 
-    def test_a_network_whose_process_died_is_lost_alone(self, tmp_path):
-        """It is a hole of its rows when the block is solved again."""
-        study = load_text(tmp_path, study_text(("size: 16", "size: 8")))
-        content, file = content_of("sample", study, tmp_path)
-        block = file["name"]
-        solve.run(content, Attempts({f"{block} 0 {file['meshed']}": "its process died"}))
-        keys = list(file["results"])
-        found = store.read(tmp_path / "samples" / f"{block}.h5", keys, ("status",))
-        for key in keys:
-            assert found[key]["status"][0] == Status.FAILED and found[key]["messages"]["0"] == "its process died"
-            assert (found[key]["status"][1:2] == Status.SOLVED).all()
-
-    def test_what_was_lost_of_one_mesh_type_is_tried_of_another(self, tmp_path):
-        """Names of networks say all that these depend on, the code among it."""
-        names = []
-        for mesh_type in ("structured", "right"):
-            how = ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {mesh_type}")
-            spent = Noting()
-            _, results = networks(tmp_path, how, spent=spent)
-            assert [found["messages"] for found in results] == [{}] * len(results)
-            names.append(set(spent.names))
-        assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
-
     def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
         """One row of cells at nu = 0 is a mechanism with area energies, and where it is lies in the last digits."""
         how = (
@@ -454,29 +414,6 @@ class TestReferences:
         assert "no interpolant; up to 1024 points they would be solved one by one" in data.reference_message.item()
         assert "samples without a reference, and so without an error: 2048 of 2048\n" in summary
         assert data.reference_message.item() in summary
-
-    def test_one_reference_whose_process_died_is_a_hole_of_its_points(self, tmp_path):
-        content, path = self.without(tmp_path, self.PLAIN)
-        spent = Noting()
-        interpolate.run(content, spent)
-        assert len(spent.names) == 8
-        path.unlink()
-        content, path = self.without(tmp_path, self.PLAIN)
-        interpolate.run(content, Attempts({spent.names[3]: "its process died"}))
-        after = store.read(path, store.stored(path))
-        assert [key for key in after if after[key]["message"] == "its process died"] == [spent.names[3]]
-
-
-class Noting(Attempts):
-    """Notes the names of its tasks."""
-
-    def __init__(self):
-        super().__init__({})
-        self.names = []
-
-    def attempt(self, key, function, failed):
-        self.names.append(key)
-        return super().attempt(key, function, failed)
 
 
 def networks(folder, *replaced, spent=None):

@@ -1,6 +1,5 @@
 """Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,23 +13,16 @@ from springtune.cli import main
 from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
-from springtune.studies.kinds.bodies import mesh, stored
 from springtune.studies.kinds.bodies.plan import shape_mesh_key, shape_reference_task, shape_scene_task
 from springtune.studies.kinds.bodies.shape_expand import READ_AT_ONCE
-from springtune.studies.kinds.bodies.task_values import ONE_LOAD, geometry, named, shape_of
-from springtune.studies.kinds.bodies.task_values import load as values_of
-from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
-from springtune.studies.runs.attempts import Attempts
-from springtune.studies.runs.plan import plan
 from springtune.studies.runs.rerun import output_files
 
 from campaigns import do_stages, load_text
 from tables import STUDIES
 
-REPOSITORY = Path(__file__).parents[3]
 COOK = STUDIES["shapes"]
 
 
@@ -102,37 +94,6 @@ grids: {one: {beam: small, mesh_type: structured, mesh_size: 5 mm, material: thi
     study = load(COOK + grids)
     assert study.axes["load"] == ("traction", "shear") and study.axes["mesh_size"] == (5e-3, 8e-3, 16e-3)
     assert study.axes["definition"] == ("lattice", "patch", "delingette") and study.axes["shape"] == ("cook",)
-
-
-def test_tasks_have_all_of_a_shape():
-    hole = st.Hole.circle((0.05, 0.02), 0.008)
-    case = st.LoadCase(
-        "pull", (st.Support("left", 0.0, 0.0), st.Support("right", x=1e-3)), (st.Traction("upper", (0.0, 1.0)),),
-        (st.Pressure("hole", 1e6, True),), (0.0, -9.81),
-        (st.Quantity("b", "stress", "top", "xx", 1e6, "x"), st.Quantity("a", "area")),
-    )  # fmt: skip
-    points = {"top": (0.05, 0.028)}
-    shape = st.Shape.rectangle(0.1, 0.04, holes=[hole], points=points, loads={"pull": case}, thickness=2e-3)
-    made = shape_of(geometry(shape), 2e-3, values_of(case))
-    assert (made.outline, made.holes, made.points) == (shape.outline, shape.holes, shape.points)
-    plain = {"name": "pull", "quantities": case.quantities}
-    assert replace(made.loads[ONE_LOAD], **plain) == case
-    assert [(one.name, one.kind) for one in made.loads[ONE_LOAD].quantities] == [("q0", "area"), ("q1", "stress")]
-    told = named("reference of shape 'shape', load 'load': 'q1' of 'top'", shape, case)
-    assert told == f"reference of shape '{shape.name}', load 'pull': 'b' of 'top'"
-
-
-def test_a_mesh_is_stored_with_its_groups(tmp_path):
-    core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
-    grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
-    grouped = replace(grouped, unusable={"odd one": "is not on the outline"})
-    stored.write_made(tmp_path, "one", "key", grouped, {})
-    again = stored.read(tmp_path, "one")
-    assert again.mesh.shares_cells(grouped.mesh) and np.array_equal(again.mesh.points, grouped.mesh.points)
-    assert list(again.sides) == list(grouped.sides) and again.unusable == grouped.unusable
-    assert all(np.array_equal(again.sides[name], edges) for name, edges in grouped.sides.items())
-    assert np.array_equal(again.points["corner"], grouped.points["corner"])
-    assert all(np.array_equal(again.parts["core"][3], masks[3]) for masks in grouped.parts.values())
 
 
 # -- what becomes of it ------------------------------------------------------------------------------------------------
@@ -381,54 +342,12 @@ def test_figures_of_two_loads_never_share_a_name(refusal):
     assert "figures of shape 'a_B' under 'c' and of 'a' under 'b_c' would have one name" in message
 
 
-def test_references_are_told_apart_whatever_they_are_called(load, tmp_path):
-    content = yaml.safe_load(COOK)
-    one, third = content["shapes"]["cook"], content["materials"]["third"]
-    content["materials"] = {"c": third, "b_c": third | {"young_modulus": "2 MPa"}}
-    content["shapes"] = {"a": one, "a_b": one}
-    grid = content["shape_grids"]["all"]
-    pairs = {"one": ("a", "b_c"), "other": ("a_b", "c")}
-    content["shape_grids"] = {name: grid | {"shape": a, "material": b} for name, (a, b) in pairs.items()}
-    jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results").values()
-    files = [file for job in jobs if job.stage.name == "reference" for file in job.content["files"]]
-    assert len({task["key"] for file in files for task in file["tasks"]}) == 2
-
-
-def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
-    """Two shapes that are one body have two meshes, and one reference."""
-    content = yaml.safe_load(COOK)
-    content["shapes"]["twin"] = content["shapes"]["cook"]
-    content["shape_grids"]["all"] |= {"shape": ["cook", "twin"], "mesh_size": "16 mm"}
-    made = plan(load(yaml.safe_dump(content)), tmp_path / "results").values()
-    asked = dict.fromkeys((job.stage.name for job in made), 0)
-    for job in made:
-        asked[job.stage.name] += len(job.results)
-    assert asked == {"reference": 1, "mesh": 2, "solve": 4}
-
-
-def test_scenes_whose_mesh_could_not_be_made_are_holes_that_say_why(load, tmp_path):
-    study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
-    jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study").values()}
-    mesh.run(jobs["mesh"].content, Attempts({"shape_cook_free_16mm": "it died"}))
-    tree, told = done(study, tmp_path / "results/study")
-    assert "2 failed" in told and set(tree["shapes"].message.values.ravel()) == {"mesh: it died"}
-
-
 def test_a_scene_that_cannot_be_stated_is_a_hole(load, tmp_path):
     """All its force is on what is held: known once there is a mesh."""
     text = COOK.replace("forces: {right: [0, 1 N]}", "forces: {left: [0, 1 N]}")
     data = scenes(load(text), tmp_path / "results/study")
     assert {STATUS[number] for number in data.status.values.ravel()} == {"failed"}
     assert all("neither pulls what is free" in message for message in data.message.values.ravel().tolist())
-
-
-def test_anisotropic_materials_are_told_without_their_names(load, tmp_path):
-    text = COOK.replace(
-        "{young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}",
-        "{young_modulus_x: 2 MPa, young_modulus_y: 1 MPa, poisson_ratio_xy: 0.3, shear_modulus: 1 MPa}",
-    )
-    messages = scenes(load(text), tmp_path / "results/study").message.sel(definition="lattice").values.ravel().tolist()
-    assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
 
 
 def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
@@ -468,17 +387,3 @@ def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tm
     assert "rows" in export(tree, tmp_path / "table.csv", "shapes")
     with pytest.raises(ValueError, match="the dataset has no scenes of beams"):
         st.plot_size(tree, beam="200x40")
-
-
-def test_definitions_are_compared_under_the_loads_of_beams_alone(load, tmp_path):
-    """Loads of shapes are labels of the dataset, too, and no scene of a beam has them."""
-    grid = "beam: b, mesh_type: structured, mesh_size: 5 mm, material: third, load: traction, force: 1 N"
-    study = load(
-        COOK.replace(", 8 mm]", "]").replace("shear:", "sheared:")
-        + "beams: {b: {length: 20 mm, height: 10 mm}}\noutputs: [definitions]\n"
-        + f"grids: {{all: {{{grid}, definition: [lattice, area], kinematics: linear, moduli: true}}}}\n"
-    )
-    tree, _ = done(study, tmp_path / "results/study")
-    assert {"traction", "sheared"} <= set(tree["load"].values.tolist())
-    stems = ["definitions_moduli", "definitions_size_traction", "definitions_loads_structured"]
-    assert list(outputs()["definitions"].figures(study)) == [stem for stem, _, _ in definitions(tree)] == stems

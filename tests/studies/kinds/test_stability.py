@@ -1,21 +1,10 @@
 """The section `stability` of a study, and its stage."""
 
-import pytest
-
-from springtune.mechanics.integrators import BEHAVIOURS
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material
-from springtune.studies.kinds.collect import group_of
-from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
-from springtune.studies.kinds.stability import solve as stability
-from springtune.studies.kinds.stability.kind import KIND
-from springtune.studies.output.dataset import DIMENSIONS
+from springtune.studies.kinds.stability import EXPERIMENTS, ONCE
 from springtune.studies.runs import attempts, store
 from springtune.studies.runs import keys as code
 
 from tables import STUDIES
-
-STABILITY = group_of(KIND)
 
 
 def test_experiments_are_one_a_definition_or_one_in_all(load):
@@ -30,26 +19,6 @@ def test_experiments_are_one_a_definition_or_one_in_all(load):
 def test_output_without_experiments_is_refused(refusal):
     head, _, rest = STUDIES["stability"].partition("stability:")
     assert "add a section 'stability'" in refusal(f"{head}outputs: stability\n{rest[rest.index('grids:') :]}")
-
-
-def test_every_variable_has_its_dimensions_described():
-    own = {name for dimensions, *_ in STABILITY.variables.values() for name in dimensions}
-    assert own <= set(DIMENSIONS) | set(STABILITY.dimensions)
-    assert own - {"definition", "mesh_size", "experiment"} == set(AXES)
-    assert STABILITY.flags["behaviour"] == BEHAVIOURS
-
-
-@pytest.mark.parametrize("name", ["contrast", "slivers", "perturbation", "poisson", "strains", "buckling"])
-def test_rows_have_the_names_and_labels_of_the_dataset(name):
-    setup = stability.Setup(
-        Beam(0.06, 0.02, 1e-3, "b"), Material(210e9, 0.3, 7850.0, "steel"), 2e4, "lattice", "structured", (5e-3,)
-    )
-    rows = [{"definition": "lattice", "experiment": name} | row for row in stability.RUN[name](setup)]
-    names = {variable for row in rows for variable in row} & {*STABILITY.variables}
-    found = STABILITY.of_rows(AXES | {"definition": ["lattice"], "mesh_size": [5e-3]}, rows, names)
-    assert {key for row in rows for key in row} <= {*found.variables, "definition", "experiment"}
-    for variable in names - {one for one in names if one.endswith(("_error", "displacement", "message"))}:
-        assert found[variable].notnull().any(), variable
 
 
 def test_a_failing_experiment_is_stored_with_its_message(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.bodies import any_reference, collect, reference
+from springtune.studies.kinds.bodies import any_reference, collect
 from springtune.studies.kinds.bodies.kind import summary
 from springtune.studies.kinds.bodies.plan import (
     box_of,
@@ -15,7 +15,6 @@ from springtune.studies.kinds.bodies.plan import (
     solved_reference,
 )
 from springtune.studies.runs import store
-from springtune.studies.runs.attempts import Attempts
 from springtune.studies.runs.plan import plan
 
 from campaigns import do_stages
@@ -138,11 +137,3 @@ def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     assert {name: value for name, value in found[0].items() if name != "seconds"} == {
         name: value for name, value in alone.items() if name != "seconds"
     }
-
-
-def test_one_whose_process_dies_is_a_hole(load, tmp_path):
-    study = load(lengths(MANY))
-    (job,) = [job for job in plan(study, tmp_path).values() if job.stage.name == "reference"]
-    (task,) = (task for file in job.content["files"] for task in file["tasks"])
-    reference.run(job.content, Attempts({task["key"]: "it died"} | dict.fromkeys(task["problems"], "it died")))
-    assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "it died"

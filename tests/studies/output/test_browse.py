@@ -52,9 +52,6 @@ def text(path):
 
 
 class TestPage:
-    def test_same_dataset_same_bytes(self, path, text):
-        assert page(path) == text
-
     def test_texts_of_the_dataset_are_no_markup(self, path):
         text = page(path, ["figures/<img src=x>.png"])
         assert "alert('" not in text and "<img src=x>" not in text
@@ -95,12 +92,6 @@ class TestPage:
         for group, less in zip(whole, some):
             names = [[row["name"] for row in one["variables"]] for one in (group, less)]
             assert sorted(names[0]) == sorted(names[1] + less["left_out"]) and not group["left_out"]
-
-    def test_links_are_those_given(self, path):
-        assert content(page(path, ["tables/index.html", "figures/b.png"]))["files"] == [
-            "figures/b.png",
-            "tables/index.html",
-        ]
 
     def test_views_name_variables_that_studies_have(self):
         """A plot whose variable is misspelt would be left out silently."""

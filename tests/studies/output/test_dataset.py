@@ -5,12 +5,9 @@ import json
 import os
 import shutil
 import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
-import psutil
 import pytest
 import xarray as xr
 
@@ -20,7 +17,6 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 from springtune.studies.config.kind import modules
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.bodies.tables import tables
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK, Group
@@ -64,16 +60,6 @@ def test_rows_fill_the_cells_of_their_labels_and_no_others():
         group.of_rows(axes, [{"load": "bending", "status": 1}])
 
 
-def test_empty_dataset_is_all_holes_with_units():
-    data = ROOT.empty(AXES)
-    assert data.sizes["mesh_size"] == 2
-    assert (data.status == 0).all() and data.displacement.isnull().all()
-    assert (data.message == "").all()
-    for name, variable in data.variables.items():
-        assert variable.attrs["units"] and variable.attrs["long_name"], name
-    assert data.status.attrs["flag_meanings"].split()[1] == "solved"
-
-
 def test_written_dataset_opens_as_a_tree(tmp_path):
     path = tmp_path / "dataset.nc"
     root = ROOT.empty(AXES)
@@ -106,23 +92,6 @@ def test_arrays_are_read_when_needed_and_by_chunks(tmp_path):
         assert tree.displacement.sel(beam="c").equals(curves.displacement.sel(beam="c"))
 
 
-def test_tables_of_a_few_scenes_among_many_cells_read_no_more_than_they_show(tmp_path):
-    root = ROOT.empty(AXES | {"beam": tuple(f"b{n}" for n in range(40)), "mesh_size": tuple(1e-3 * np.arange(1, 4001))})
-    asked = {"beam": slice(3, 6), "mesh_size": slice(None, 4)}
-    root.status[asked] = 1
-    root.message[asked] = "what buckles, \u03bb < 1"
-    root.displacement[asked] = np.random.default_rng(1).random(root.displacement[asked].shape)
-    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
-    with st.open(tmp_path) as tree:
-        found = tables(tree)
-        unread = {name for name, array in tree.variables.items() if "values with dtype" in repr(array)}
-    assert {"message", "solver", "displacement", "residual", "solve_seconds"} <= unread
-    assert not unread & {"beam", "mesh_size", "status", "reference_displacement"}
-    # Holes are NaN, which is no other NaN.
-    assert repr(found) == repr(tables(xr.DataTree(root))) and len(found[0]["rows"]) == 12
-    assert found[0]["rows"][0]["paper_linear_message"] == "what buckles, \u03bb < 1"
-
-
 def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
     axes = AXES | {"beam": tuple(f"b{n}" for n in range(80)), "mesh_size": tuple(1e-3 * (1 + np.arange(800)))}
     root = ROOT.empty(axes)
@@ -143,28 +112,6 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
                 assert {"units", "long_name"} <= set(found[name].attrs), name
     with st.open(tmp_path) as tree:
         assert str(tree.message[{"beam": -1, "mesh_size": -1}].values.ravel()[0]).endswith("\u03bb < 1")
-
-
-def test_a_dataset_with_large_texts_is_closed(tmp_path):
-    root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(80000)))})
-    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
-    path = str((tmp_path / "dataset.nc").resolve())
-
-    def is_open():
-        return path in {file.path for file in psutil.Process().open_files()}
-
-    with st.open(tmp_path) as tree:
-        assert "values with dtype" in repr(tree.message.variable) and is_open()
-        assert not (tree.message[{"mesh_size": slice(10)}] != "").any()
-    assert not is_open()
-
-
-def test_texts_of_most_cells_are_stored_as_ever(tmp_path):
-    root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(20000)))})
-    root.solver[:] = "Cholesky"
-    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
-    with h5py.File(tmp_path / "dataset.nc") as file:
-        assert file["solver"].chunks is None and file["message"].id.get_storage_size() == 0
 
 
 class TestConventions:
@@ -274,14 +221,3 @@ class TestInterruptedWrite:
                 st.open(tmp_path / "cut.nc")
         atomic.remove_unfinished(tmp_path)
         assert not unfinished.exists()
-
-    def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(self, tmp_path):
-        write_curves(tmp_path / "dataset.nc", 1.0)
-        paths = os.pathsep.join(map(str, [Path(__file__).parent, *sys.path]))
-        command = [sys.executable, "-c", self.CROWDED, str(tmp_path / "dataset.nc")]
-        done = subprocess.run(command, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True)
-        assert "cannot be written" in done.stderr
-        assert "MB are free there); make room" in done.stderr.splitlines()[-1]
-        assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
-        with st.open(tmp_path) as tree:
-            assert (tree.displacement == 1.0).all()

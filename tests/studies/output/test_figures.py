@@ -1,9 +1,6 @@
 """Figures: what each plots of a dataset, on which axes, and what it leaves alone."""
 
 import io
-import os
-import subprocess
-import sys
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -17,15 +14,12 @@ from PIL import Image
 
 import springtune as st
 from springtune.studies.config.kind import FORMATS, Output, outputs
-from springtune.studies.kinds.bodies import beam_figures, errors
-from springtune.studies.kinds.bodies.beam_figures import draw_curve
-from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.output import present, style
 from springtune.studies.output.drawing import NETWORK_LINE
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import closure
 
-from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset
+from synthetic import BEAMS, DEFINITIONS, SIZES, TYPES, dataset
 
 
 @pytest.fixture(autouse=True)
@@ -110,35 +104,12 @@ def test_too_few_axes_are_refused(tree, plot):
         plot(tree, Figure().subplots(), **EVERY_PLOT[plot][0])
 
 
-def test_importing_figures_chooses_no_backend():
-    modules = sorted({plot.__module__ for plot in EVERY_PLOT})
-    done = subprocess.run(
-        [sys.executable, "-c", f"import {', '.join(modules)}, sys, matplotlib\n"
-         "print('matplotlib.pyplot' in sys.modules, matplotlib.get_backend())\n"
-         "print(matplotlib.rcParams['axes.grid'], matplotlib.rcParams['font.size'])"],
-        capture_output=True, text=True, check=True, env=os.environ | {"MPLBACKEND": "svg"},
-    )  # fmt: skip
-    assert done.stdout.split() == ["False", "svg", "False", "10.0"]
-
-
 # -- what they show ----------------------------------------------------------------------------------------------------
 
 
 def drawn(axes, label):
     """The line of a label."""
     return next(line for line in axes.get_lines() if line.get_label() == label)
-
-
-def test_a_backend_of_notebooks_stays_interactive():
-    """It says so when pyplot is imported, in the middle of the first plot; later figures were not shown."""
-
-    @style.styled
-    def first():
-        matplotlib.interactive(True)
-        return []
-
-    first()
-    assert matplotlib.is_interactive()
 
 
 def test_a_sensitivity_curve_carries_the_errors_of_the_dataset(tree):
@@ -305,39 +276,6 @@ def test_a_refused_plot_names_what_there_is(tree, plot, group, selection, said):
         plot(data, **selection)
 
 
-def test_the_only_label_is_taken(tree):
-    data = tree["sensitivity"].to_dataset()
-    data["status"] = data.status.where((data.beam == "200x40") & (data["load"] == "pressure"), 0)
-    axes = st.plot_sensitivity(data, mesh_type="free", material="rubber")
-    assert axes.get_title("left") == "200x40, free, rubber, pressure"  # a curve alone does not say how long a beam is
-
-
-def test_figures_of_a_load_without_the_main_kinematics_are_of_its_own(tree):
-    """As of a pressure that follows its face, which no linear network has."""
-    status = tree.status.where((tree["load"] == "pressure") == (tree.kinematics == "linear"), 0)
-    data = xr.DataTree(tree.to_dataset().assign(status=status, field_error=tree.field_error.where(status == 1)))
-    chosen = {selection["load"]: selection for stem, _, selection in definitions(data) if "size" in stem}
-    assert [chosen[load]["kinematics"] for load in LOADS] == ["nonlinear", "nonlinear", "linear"]
-    panels = st.plot_definitions_size(data, **chosen["pressure"])
-    assert [panel.get_title("left") for panel in panels] == TYPES
-    named = [{name for line in panel.lines for name in line.get_label().split(" (")[0].split(", ")} for panel in panels]
-    assert all(set(DEFINITIONS) <= names for names in named)
-    nothing = data.to_dataset().assign(field_error=np.nan * tree.field_error)
-    panels = st.plot_definitions_size(nothing, **chosen["pressure"])
-    assert [[text.get_text().replace("\n", " ") for text in panel.texts] for panel in panels] == [
-        ["No definition has a field error here: solved (6)."]
-    ] * 2
-
-
-def test_a_heat_map_of_a_mesh_type_of_which_nothing_was_solved_says_so_in_each_cell(tree):
-    data = tree.to_dataset()
-    data["status"] = data.status.where(data.mesh_type != "free", 5)
-    data["deformation_error"] = data.deformation_error.where(data.mesh_type != "free")
-    panel = st.plot_definitions_loads(data, **EVERY_PLOT[st.plot_definitions_loads][0])[0]
-    assert {text.get_text() for text in panel.texts} == {"×"}
-    assert np.ma.getmaskarray(panel.images[0].get_array()).all()
-
-
 # -- the stage ---------------------------------------------------------------------------------------------------------
 
 
@@ -393,21 +331,6 @@ def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     assert all(len(found) == 1 for found in kinds.values())
 
 
-def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
-    """Each says that it is linear; its files are those that the study declares."""
-    root, curves = (tree[name].to_dataset().sel(kinematics=["linear"]) for name in ("/", "sensitivity"))
-    linear = xr.DataTree.from_dict({"/": root, "/sensitivity": curves})
-    for drawers in (beam_figures.sensitivity, errors.size):
-        found = list(drawers(linear))
-        assert [stem for stem, _, _ in found] == [stem for stem, _, _ in drawers(tree)]
-        for _, plot, selection in found:
-            assert selection["kinematics"] == "linear"
-            drawn_on = np.ravel(plot(linear, **selection))[0].figure
-            said = [text.get_text() for text in drawn_on.findobj(Text)]
-            assert any("linear" in text for text in said), said
-            plt.close(drawn_on)
-
-
 def said(panel):
     """All texts of a figure."""
     return [text.get_text() for text in panel.figure.findobj(Text)]
@@ -439,35 +362,3 @@ def test_signed_errors_say_once_what_their_sign_means():
     panel = st.plot_definitions_loads(tree, beam="100x20", mesh_type="free", kinematics="linear")[0]
     (text,) = (text.replace("\n", " ") for text in said(panel) if "too soft" in text)
     assert text.startswith("positive: too soft; under compression and pressure, where displacements are negative, neg")
-
-
-@pytest.mark.parametrize("plot", [st.plot_size, st.plot_definitions_size])
-def test_one_mesh_size_is_no_column_of_dots(tree, plot):
-    for panel in plot(tree.to_dataset().isel(mesh_size=[-1]), **EVERY_PLOT[plot][0]):
-        lines = [line for line in panel.get_lines() if set(line.get_label().split(", ")) & {*DEFINITIONS}]
-        places = [place for line in lines for place in line.get_xdata()]
-        assert panel.get_xscale() == "linear" and panel.get_xlabel().startswith("One mesh size, ")
-        assert places and len(set(places)) == len(places) and not len(panel.get_xticks())
-
-
-def test_counts_and_shares_of_large_strains_look_different(tree):
-    texts = {text for panel in st.plot_stability_strains(tree) for text in (one.get_text() for one in panel.texts)}
-    assert all(text.isdecimal() or text in ("", "f", "path") or text.endswith(" %") for text in texts), texts
-
-
-@pytest.mark.parametrize(("predicted", "shown"), [(150e6, True), (50e6, False), (300e6, False)])
-def test_a_prediction_beyond_the_axes_has_no_mark_and_no_word(predicted, shown):
-    stiffness = np.array([100e6, 150e6, 200e6])
-    curve = xr.Dataset(
-        {
-            "stiffness": ("stiffness_ratio", stiffness),
-            "deformation_error": ("stiffness_ratio", [0.3, 0.2, 0.1]),
-            "status": ("stiffness_ratio", [1, 1, 1]),
-            "best_stiffness": np.nan,
-            "predicted_stiffness": predicted,
-        }
-    )
-    panel = Figure().add_subplot()
-    seen = draw_curve(panel, curve, 1e6, "5 mm", style.line(0), stiffness / 1e6)
-    assert ("predicted" in seen) == shown
-    assert any(line.get_marker() == "|" for line in panel.lines) == shown

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from pypdf import PdfReader
 from test_figures import EVERY_PLOT, closed, each  # noqa: F401  # a fixture of that file
 
-from springtune.studies.output import labels, style
+from springtune.studies.output import style
 from springtune.studies.output.style import png_and_pdf
 
 from synthetic import dataset
@@ -111,30 +111,6 @@ def test_texts_of_a_pdf_can_be_searched_and_a_rare_character_is_there():
 
 
 # -- texts -------------------------------------------------------------------------------------------------------------
-
-
-def test_texts_are_wrapped_at_spaces_and_a_number_keeps_its_unit():
-    room = 14 * labels.CHARACTER * style.SMALL / 72 + 1e-6
-    assert labels.wrapped("one two three four", room) == "one two three\nfour"
-    assert labels.wrapped("100x20, mesh 5 mm, rubber", room) == "100x20, mesh\n5 mm, rubber"
-    assert labels.wrapped("unbreakable", 0.01) == "unbreakable"
-
-
-def test_names_stand_beside_the_panel_in_the_order_of_their_ends():
-    figure = Figure(figsize=(3, 2), layout="constrained")
-    panel = figure.subplots()
-    for name, values in {"low": [3, 1], "high": [1, 2], "nowhere": [np.nan, np.nan]}.items():
-        panel.plot(values, label=name)
-    labels.finish(panel, why="nothing")
-    assert [text.get_text() for text in panel.get_legend().get_texts()] == ["high", "low"]
-    figure.draw_without_rendering()
-    names = panel.get_legend().get_window_extent()
-    assert panel.get_window_extent().x1 < names.x0 and names.x1 <= figure.bbox.x1
-
-
-def test_curves_that_are_one_line_to_the_eye_share_a_name():
-    curves = {"a": np.array([0.1, np.nan]), "b": np.array([0.1005, np.nan]), "c": np.array([0.1, 0.2])}
-    assert labels.alike(curves, 0.001) == [["a", "b"], ["c"]]
 
 
 # -- colours -----------------------------------------------------------------------------------------------------------

@@ -5,11 +5,9 @@ import logging
 import os
 import re
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import xarray as xr
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLogHandlerBase
 
@@ -81,17 +79,6 @@ class TestText:
         text = told(root)
         assert "-20 %  too soft" in text and "+1 %  too stiff" in text
 
-    def test_everything_solved_has_no_holes(self, root):
-        data = root.where(root.status.isin([0, 1]), 0)
-        text = told(data.assign(status=data.status.astype("int8")))
-        assert "2 solved\n" in text and "Not everything" not in text and "2 of" not in text
-
-    def test_nothing_solved(self, root):
-        root["status"].values[root.status.values > 0] = Status.FAILED
-        lines = told(root).splitlines()
-        assert "  scenes  5  5 failed" in lines and not any("worst" in line for line in lines)
-        assert lines[-1].startswith("Not everything is solved: 5 of 5 scenes.")
-
     def test_scenes_without_a_reference_are_named(self, rows):
         rows[1] |= {"reference_displacement": np.nan, "reference_message": "no reference: too slender"}
         text = told(ROOT.of_rows(AXES, rows))
@@ -110,11 +97,6 @@ class TestText:
         assert "  sensitivity, best stiffness  1  1 failed" in lines
         assert "  100x20, free, 1 mm, steel, traction, linear: no minimum" in lines
         assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes; 1 of 1 sensitivity, best stiffness.")
-
-    def test_a_hole_of_no_dimensions_has_its_reason_alone(self):
-        data = xr.Dataset({"status": ((), int(Status.FAILED)), "message": ((), "it folds")})
-        lines = summing_up.text({"/laying": data}, "A study").splitlines()
-        assert lines[lines.index("laying, failed: 1 of 1") + 1] == "  it folds"
 
     def test_a_few_are_named_of_many_and_of_each_reason_one_first(self):
         beams = [f"beam-{letter}" for letter in "abcdefghij"]
@@ -298,13 +280,6 @@ class TestHandler(TestLogHandlerBase):
         shown.close()
         assert made.getvalue() == "Building DAG of jobs...\nNothing to be done\n"
 
-    def test_a_warning_before_a_run_leaves_it_a_line_a_rule(self, monkeypatch):
-        made = io.StringIO()
-        shown = handler(monkeypatch, made)
-        shown.emit(record("take care", logging.WARNING))
-        emit_run(shown)
-        assert made.getvalue().startswith("take care\n3 jobs\nmesh: done")
-
     def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
         made = io.StringIO()
         shown = handler(monkeypatch, made)
@@ -325,14 +300,3 @@ def test_what_is_left_follows_the_rate_so_far():
     assert display.line() == "1 of 3 jobs, 1:00 min, about 2:00 min left: b"
     display.follow(LogEvent.JOB_ERROR, 2, "")
     assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 2:00 min left"
-
-
-def test_a_job_without_a_word_on_a_full_disk(planned, monkeypatch):
-    study, made, names = planned
-    log = made["collect"].folder / f"logs/{names[0]}.log"
-    log.parent.mkdir(parents=True)
-    log.touch()
-    for room, said in ((5, "it said nothing"), (0, "it could say nothing: the disk is full; make room")):
-        state = SimpleNamespace(f_blocks=100, f_bavail=room)
-        monkeypatch.setattr(os, "statvfs", lambda folder, state=state: state)
-        assert said in summary.broken(study, made, 0.0)

@@ -129,14 +129,6 @@ def test_values_of_mixed_kinds_are_shown_in_the_units_of_those_that_are_chosen(t
             assert number(there, variable="mixed/value", digits=1, **entry) == text
 
 
-def test_all_that_is_wrong_is_told_at_once(datasets):
-    with pytest.raises(PaperError) as error:
-        numbers({name: {"study": "mine", "variable": name} for name in ("x", "y")}, {}, datasets)
-    assert len(str(error.value).splitlines()) == 2
-    with pytest.raises(PaperError, match="x: declared twice"):
-        numbers({"x": {}}, {"x": {}}, datasets)
-
-
 def test_an_optional_number_may_lack_and_so_does_what_is_made_of_it(datasets):
     lacking = {"study": "mine", "variable": "deformation_error", "at": HOLE, "optional": True}
     found = numbers(
@@ -242,34 +234,6 @@ def test_the_same_dataset_gives_the_same_bytes_and_another_one_others(tmp_path, 
         run(source, tmp_path / "build", output, path)
     assert "no number is called 'unheard'" in str(error.value) and "main.typ:5" in str(error.value)
     assert output.read_bytes() == content
-
-
-HOSTILE = "#panic(1) @no <tab> *a* _b_ `c` $x_{$ [d](e) \\ ] 1x1"
-"""What Typst, mathematics of figures or Markdown would take for more than a name."""
-
-
-@pytest.mark.slow
-def test_names_are_printed_as_they_are(tmp_path, path):
-    pypdf = pytest.importorskip("pypdf")
-    with xr.open_datatree(path, engine="h5netcdf") as tree:
-        groups = {one: tree[one].to_dataset(inherit=False).load() for one in ("/", "sensitivity")}
-    named = {name: data.assign_coords(material=["steel", HOSTILE]) for name, data in groups.items()}
-    named["/"].attrs |= {"title": HOSTILE, "software": json.dumps({HOSTILE: HOSTILE})}
-    xr.DataTree.from_dict(named).to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
-    at = {"at": CELL | {"material": HOSTILE}}
-    headed = {"title": "{material}", "group": "{material}"}
-    table = {"all": NUMBERS["tables"]["errors"]["all"] | at, "rows": [headed], "columns": [headed]}
-    figures = {"curve": {"panels": [FIGURES["curve"]["panels"][0] | {"at": CURVE | {"material": HOSTILE}}]}}
-    main = re.sub(r' ?#n\("error"\)|#if .*', "", MAIN) + "#data.labels.map(named).join() #software()"
-    declared = {"numbers": {}, "tables": {"errors": table}}
-    source = paper(tmp_path / "source", main, declared, figures)
-    run(source, tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "mine.nc")
-
-    def shown(file):
-        text = "".join(page.extract_text() for page in pypdf.PdfReader(file).pages)
-        return re.sub(r"\s", "", text).count(re.sub(r"\s", "", HOSTILE))
-
-    assert shown(tmp_path / "build/curve.pdf") == 1 and shown(tmp_path / "paper.pdf") >= 5
 
 
 def test_an_example_draws_a_figure_of_the_paper_and_what_is_wrong_with_one_is_told(tmp_path, datasets):

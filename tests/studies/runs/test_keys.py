@@ -1,14 +1,11 @@
 """Keys follow what is computed: the code without what is written for readers, and the packages that it imports."""
 
-import ast
 import importlib.metadata
 import sys
 from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
@@ -34,17 +31,6 @@ def test_every_change_of_code_is_in_a_digest(change):
     changed = MODULE.replace(*change)
     compile(changed, "changed", "exec")
     assert keys.digest_of(changed) != keys.digest_of(MODULE)
-
-
-PATHS = sorted(keys.PACKAGE.rglob("*.py"))
-
-
-@settings(max_examples=30)
-@given(st.sampled_from(PATHS))
-def test_formatting_of_our_own_modules_changes_nothing(path):
-    """Written anew from its tree a module has no comments, other quotes and other lines."""
-    text = path.read_text()
-    assert keys.digest_of(ast.unparse(ast.parse(text))) == keys.digest_of(text)
 
 
 # -- imports -----------------------------------------------------------------------------------------------------------
@@ -84,28 +70,6 @@ def test_meshers_count_with_their_meshes():
     assert "netgen" in keys.mesh_type_closure("free").packages
     assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
     assert "meshio" in keys.mesh_type_closure("from a file").packages
-
-
-LOOKED_UP = (
-    "studies.kinds.collect",
-    "studies.output.present",
-    "studies.output.browse.page",
-    "studies.output.page",
-    "studies.paper.build",
-)
-
-
-def test_distributions_of_packages_are_those_that_are_installed():
-    known = importlib.metadata.packages_distributions()
-    used = {name for stage in stages() for name in keys.closure(stage.module).packages}
-    used |= {name for one in DEFINITIONS for name in keys.definition_closure(one).packages} | {"netgen"}
-    used |= {name for module in LOOKED_UP for name in keys.closure(module).packages}
-    for package in used & set(known):
-        assert keys.distribution(package).lower() in map(str.lower, known[package])
-    # Whatever is known by itself costs nothing to look up.
-    for package in used & set(known):
-        assert package in keys.DISTRIBUTIONS or importlib.metadata.version(package)
-    assert keys.distribution("no_such_package") == "no_such_package"
 
 
 def forget():
@@ -173,21 +137,6 @@ def test_an_extra_that_is_not_there_or_not_wanted_is_none(monkeypatch):
         missing = _keys()
     forget()
     assert unwanted == missing
-
-
-def test_of_pythons_version_what_is_before_the_patch_level_counts(monkeypatch):
-    major, minor, patch, *_ = sys.version_info
-
-    def key(*version):
-        forget()
-        monkeypatch.setattr(sys, "version_info", version)
-        return keys.stage_key("studies.kinds.bodies.mesh")
-
-    here = key(major, minor, patch)
-    assert key(major, minor, patch + 1) == here
-    assert len({here, key(major + 1, minor, patch), key(major, minor + 1, patch), key(minor, major, patch)}) == 4
-    monkeypatch.undo()
-    forget()
 
 
 # -- definitions of one's own ------------------------------------------------------------------------------------------
@@ -277,12 +226,3 @@ def test_a_definition_that_was_typed_is_refused_with_the_remedy():
             keys.definition_closure("own")
     finally:
         DEFINITIONS.discard("own")
-
-
-def test_a_file_keeps_its_digest_wherever_it_is(tmp_path):
-    texts = []
-    for folder in (tmp_path / "one", tmp_path / "two"):
-        folder.mkdir()
-        (folder / "own.py").write_text(MODULE)
-        texts.append(keys.elsewhere(folder / "own.py").digest)
-    assert texts[0] == texts[1]

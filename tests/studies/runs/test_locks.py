@@ -1,6 +1,5 @@
 """Locks of runs: whose they are, and whether that process lives."""
 
-import fcntl
 import os
 import re
 from pathlib import Path
@@ -45,17 +44,6 @@ def test_a_process_that_is_gone_was_killed_which_is_said_once(note):
     assert locks.check_idle(STUDY) and not locks.check_idle(STUDY)
 
 
-def test_where_there_are_no_locks_nothing_is_said(monkeypatch):
-    locks.begin([STUDY])
-
-    def flock(*_):
-        raise OSError("no locks here")
-
-    monkeypatch.setattr(fcntl, "flock", flock)
-    assert not locks.check_idle(STUDY) and (STUDY / locks.RUN_FILE).read_text()
-    locks.end()
-
-
 class TestClaims:
     """A folder of results belongs to one config; here `w/mine.yaml` is the file of the run before."""
 
@@ -96,15 +84,6 @@ class TestClaims:
         locks.check_claim(STUDY, Path("w/mine.yaml"))
         with pytest.raises(locks.LockedError):
             locks.check_claim(STUDY, Path("config/mine.yaml"))
-
-    def test_a_config_outside_is_known_by_its_whole_path(self, tmp_path, monkeypatch):
-        (tmp_path / "run").mkdir()
-        monkeypatch.chdir(tmp_path / "run")
-        locks.claim(STUDY, Path("../w/mine.yaml"))
-        assert locks.claimed(STUDY) == tmp_path / "w/mine.yaml"
-        locks.check_claim(STUDY, Path("../w/mine.yaml"))
-        with pytest.raises(locks.LockedError):
-            locks.check_claim(STUDY, tmp_path / "config/mine.yaml")
 
     @pytest.mark.parametrize("spoil", [Path.unlink, lambda path: path.write_text("cut")], ids=["missing", "damaged"])
     def test_a_folder_without_a_note_is_of_any_study_of_its_name(self, spoil):

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-import yaml
 
 from counting import counted
 from springtune.studies.kinds import collect, load_study
@@ -16,27 +15,7 @@ from springtune.studies.kinds.bodies import plan
 from springtune.studies.output import page
 from springtune.studies.runs import rerun, store
 
-from campaigns import do_stages, load_text
-
 REPOSITORY = Path(__file__).parents[3]
-
-
-@pytest.mark.slow
-def test_a_study_has_meshes_of_more_particles_than_a_file_of_others(tmp_path):
-    grid = {"beam": "sheet", "mesh_type": "structured", "mesh_size": "0.7 mm", "material": "steel", "force": "1 kN"}
-    grid |= {"load": "traction", "definition": "lattice", "kinematics": "linear"}
-    text = {
-        "title": "A fine mesh",
-        "beams": {"sheet": {"length": "1000 mm", "height": "500 mm"}},
-        "materials": {"steel": {"young_modulus": "210 GPa", "poisson_ratio": 0.3}},
-        "grids": {"all": grid},
-        "outputs": ["tables"],
-    }
-    study = load_text(tmp_path, yaml.safe_dump(text))
-    do_stages(study, tmp_path / "results")
-    collect.run(study, tmp_path / "results", tmp_path / "results/dataset.nc")
-    with xr.open_dataset(tmp_path / "results/dataset.nc") as data:
-        assert data.status.item() == 1 and data.particles.item() > 1e6 and abs(data.deformation_error.item()) < 2e-3
 
 
 @pytest.fixture(scope="module")
