@@ -305,9 +305,9 @@ def test_the_command_prints_materials_that_a_study_takes(tmp_path, monkeypatch):
     curve(tmp_path / "c.csv", law, noise=2e-6)
     monkeypatch.chdir(tmp_path)
     Path("pull.yaml").write_text("tests: {pull: {beam: 100x20, load: traction, file: c.csv}}")
-    made = CliRunner().invoke(main, ["identify", "pull.yaml", "--plot", "residuals.png"])
+    made = CliRunner().invoke(main, ["identify", "pull.yaml"])
     assert made.exit_code == 0, made.output
-    assert "95 %" in made.output and Path("residuals.png").stat().st_size > 5000
+    assert "95 %" in made.output
     study = yaml.safe_load(template_text(Path("x"), "beam")) | yaml.safe_load(made.output.split("in a study:\n")[1])
     for grid in study["grids"].values():
         grid |= {"material": "measured"}

@@ -51,7 +51,13 @@ COMMANDS = {
 ARGUMENT = re.compile("(mesh size|mesh types?|Young's modulus|Poisson's ratio|[a-z]+)(?=:| '| of ')")
 """Begin of messages with the name of an argument."""
 
-OPTIONS = {"mesh size": "size", "mesh type": "mesh", "mesh types": "mesh", "length": "beam", "height": "beam"} | {
+OPTIONS = {
+    "mesh size": "size",
+    "mesh type": "mesh",
+    "mesh types": "mesh",
+    "loads": "load",
+    "length": "beam",
+    "height": "beam",
     "Young's modulus": "young",
     "Poisson's ratio": "poisson",
 }

@@ -49,7 +49,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--group", "groups", multiple=True, help="Group to compare, such as sensitivity; all without.")
 @click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
 @click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
-@click.option("--all", "every", is_flag=True, help="All rows.")
 def diff(
     before: str,
     after: str,
@@ -58,7 +57,6 @@ def diff(
     groups: tuple[str, ...],
     ignored: tuple[str, ...],
     rows: int,
-    every: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -79,16 +77,16 @@ def diff(
             reading.open(paths[1]) as other,
             reading.guarded(f"{paths[0]}, {paths[1]}"),
         ):
-            given, most = Tolerance(RELATIVE if relative is None else relative, absolute), None if every else rows
-            found = compare(one, other, given, groups, ignored, most)
-            click.echo(comparison_text(found, paths, most))
+            given = Tolerance(RELATIVE if relative is None else relative, absolute)
+            found = compare(one, other, given, groups, ignored, rows)
+            click.echo(comparison_text(found, paths, rows))
     except (OSError, ValueError) as error:
         raise WrongCall(shown(error)) from None
     if found.different:
         raise click.exceptions.Exit(1)
 
 
-def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS) -> str:
+def comparison_text(found: "Comparison", paths: Sequence[Path], most: int = ROWS) -> str:
     """Comparison as text."""
     groups = {group.name: group for group in found.groups}
     changed = [(group.name, one) for group in found.groups for one in (*group.flags, *group.values) if one.changed]
@@ -138,13 +136,13 @@ def _cells(group: str) -> str:
     return "scenes" if group == "/" else f"cells of {group}"
 
 
-def _alone(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
+def _alone(group: "GroupChanges", most: int) -> Iterator[list[str]]:
     """Paragraphs on labels, cells and variables of a group that only one dataset has."""
     labels = []
     for name, both in group.labels.items():
         for side, own in zip(COMPARED, both):
             said = ", ".join(_place(group, {name: label}) for label in own[:most])
-            more = f", and {len(own) - most} more" if most and len(own) > most else ""
+            more = f", and {len(own) - most} more" if len(own) > most else ""
             labels += [f"  {name} only {side}: {said}{more}"] if own else []
     if labels:
         yield [f"labels of {group.name}", *labels]
@@ -168,7 +166,7 @@ def _short(text: str) -> str:
 
 def _more(count: int) -> list[str]:
     """Line on rows that are left out, if any."""
-    return [f"  and {count} more; --all shows them"] if count > 0 else []
+    return [f"  and {count} more; --rows shows them"] if count > 0 else []
 
 
 def _value(value: float | str) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import examples
-from .options import STUDY_EXAMPLE, asked_beam, shape_of_study, writing
+from .options import STUDY_EXAMPLE, asked_beam, shape_of_study
 
 if TYPE_CHECKING:
     from ..scene.identify import Identified
@@ -15,13 +15,11 @@ if TYPE_CHECKING:
 TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
 
-PLOT_ENDINGS = (".png", ".svg", ".pdf")
-
 
 @click.command(
     epilog=examples(
         "springtune identify pull.csv --beam 100x20 --load traction",
-        'springtune identify dic.csv --beam 100x20 --load traction --force "400 N" --noise "1 um" --plot residuals.png',
+        'springtune identify dic.csv --beam 100x20 --load traction --force "400 N" --noise "1 um"',
         "springtune identify tests.yaml --law orthotropic",
     )
 )
@@ -36,30 +34,17 @@ PLOT_ENDINGS = (".png", ".svg", ".pdf")
 @click.option("--angle", default="0 deg", help="Angle of the material's first axis from x.")
 @click.option("--noise", help="Noise of the displacements, such as '1 um'; estimated without.")
 @click.option("--shift/--no-shift", default=True, help="Remove the rigid motion of fields, and the zero of curves.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw the residuals: a .png, .svg or .pdf file.")
-def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], plot: Path | None, **options: Any) -> None:
+def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **options: Any) -> None:
     """Find a material's constants from measured tests of a sheet, with 95 % intervals.
 
     FILES are CSV files of one test, or YAML files with a list of tests, whose keys are the options and 'file'. Columns
     have units in their heads, such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'.
     """
-    from ..safe_io.atomic import check_folder, replacing
     from ..scene.identify import identify as identified
 
-    if plot:
-        if plot.suffix not in PLOT_ENDINGS:
-            raise ValueError(f"--plot: '{plot}' has another ending than {', '.join(PLOT_ENDINGS)}; give one")
-        check_folder(plot)
     rows = [options | row for path in files for row in _rows(path)]
     given = {name: value for name, _, value in (one.partition("=") for one in known)}
     found = identified([_test(**row) for row in rows], law, known=given)
-    if plot:
-        import matplotlib.pyplot as plt
-
-        found.plot()
-        with writing("--plot", plot), replacing(plot) as unfinished:
-            plt.savefig(unfinished, format=plot.suffix[1:])
-        plt.close()
     click.echo(f"{found}\n\nin a study:\n{_materials(found)}", nl=False)
 
 

@@ -1,4 +1,4 @@
-"""Options that commands share: beams, shapes, meshes, materials, datasets, limits."""
+"""Options that commands share: beams, shapes, meshes, materials."""
 
 import math
 import os
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE, PLANES
+from ..problem.parameters import PLANES
 from ..safe_io.tables import mesh_size_text
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ STUDY_EXAMPLE = "config/shapes.yaml:cook"
 # -- options that exclude each other -----------------------------------------------------------------------------------
 
 MEANINGLESS_BESIDE = {
-    "study": ("beam", "thickness", "mesh", "unit", "young", "poisson", "plane", "loads", "force"),
+    "study": ("beam", "thickness", "mesh", "unit", "young", "poisson", "plane", "force"),
     "material": ("young", "poisson"),
     "error": ("size", "best_springs", "engine"),
     "engine": ("best_springs",),
@@ -308,18 +308,3 @@ def add_options(each: Options) -> Callable[[AnyCommand], AnyCommand]:
     return lambda command: reduce(
         lambda made, name: click.option(f"--{name}", **each[name])(made), reversed(each), command
     )
-
-
-max_scenes = click.option(
-    "--max-scenes",
-    "most",
-    type=click.IntRange(min=1),
-    help=f"A study of more scenes is refused before anything is made of it; {MOST_SCENES} without.",
-)
-"""Option of a command that reads a study: argument ``most``, for `allow`."""
-
-
-def allow(most: int | None) -> None:
-    """Let this process and those that it starts read studies of so many scenes."""
-    if most is not None:
-        os.environ[MOST_SCENES_VARIABLE] = str(most)

@@ -36,7 +36,7 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
 @click.command(
     epilog=examples(
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
-        'springtune predict --beam 200x40 --error "1 %" --loads traction,bending --material steel',
+        'springtune predict --beam 200x40 --error "1 %" --load traction,bending --material steel',
         'springtune predict --beam 200x40 --error "2 %" --material steel --mesh structured,free --springs-alone '
         "--write net.csv",
         'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
@@ -53,11 +53,11 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
     "for the largest stable time steps",
 )
 @click.option("--error", help="Find the coarsest mesh that keeps this error, such as '1 %'.")
-@click.option("--load", help="Load case of a shape, by default its only one; load of a beam.")
 @click.option(
-    "--loads",
-    help="Loads that count: some of traction, compression, bending, shear and pressure, such as traction,bending.  "
-    "[default: traction,bending,shear; with --engine all]",
+    "--load",
+    help="Load case of a shape, by default its only one. Of a beam the loads that count: some of traction, "
+    "compression, bending, shear and pressure, such as traction,bending; with --engine the first is calibrated to.  "
+    "[default: traction,bending,shear; after the first with --engine all]",
 )
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
 @click.option("--best-springs", is_flag=True, help="Also search for the best springs on the mesh, for some seconds.")
@@ -72,7 +72,6 @@ def predict(
     sheet: dict[str, Any],
     error: str | None,
     load: str | None,
-    loads: str | None,
     springs_alone: bool,
     best_springs: bool,
     target: Path | None,
@@ -92,13 +91,11 @@ def predict(
 
     if target is not None:
         check_target("--write", target)
-    names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
+    names = None if load is None else [name.strip() for name in load.split(",") if name.strip()]
     if engine["engine"] is not None:
-        text, make = _in_engine(sheet, engine, load, names, springs_alone)
+        text, make = _in_engine(sheet, engine, names or [], springs_alone)
     else:
         body = asked(sheet, load, sized=error is None)
-        if body.is_beam and load is not None:
-            names = [*(names or ()), load]
         if error is None:
             text, make = _on_mesh(body, _under(body, names), springs_alone, ("best-springs",) * best_springs)
         else:
@@ -186,9 +183,7 @@ def _recommended_net(body: Asked, definition: str | None, loads: Any, none: str)
     return _net(body, definition, loads=loads)
 
 
-def _in_engine(
-    sheet: dict[str, Any], options: dict[str, Any], load: str | None, loads: list[str] | None, springs_alone: bool
-) -> Answer:
+def _in_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
     """Calibration of an engine."""
     from ..engines.base import ENGINES, Setting
     from ..engines.calibration import fit_engine, runnable
@@ -201,17 +196,18 @@ def _in_engine(
     names = ("dt", "substeps", "iterations", "precision")
     setting = Setting(**{name: options[name] for name in names if options[name] is not None})
     engine.check(setting)
-    body = asked(sheet, load)
+    body = asked(sheet, loads[0] if loads else None)
     if body.load is None:
         raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
     make = partial(Scene, body.body, body.mesh, body.material, body.load, options["force"], scale=options["scale"])
     if options["definition"] is not None:
-        scene, refused, tried = make(definition=options["definition"]), "", ()
+        scene: Scene | None = make(definition=options["definition"])
+        refused, tried = "", tuple[str, ...]()
     else:
         scene, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
     if scene is None:
         raise click.ClickException(refused)
-    fit = fit_engine(scene, engine.name, setting, loads=loads)
+    fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)
     text = fit_text(fit, body.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
     return text, fit.net if fit.factor == fit.factor else partial(_unfitted, fit.message)
 

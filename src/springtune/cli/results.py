@@ -2,7 +2,6 @@
 
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -10,9 +9,6 @@ from ..registry import how_to_install
 from ..studies.output.text import bytes_text
 from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
-
-if TYPE_CHECKING:
-    from ..studies.config.model import Study
 
 
 @click.command(epilog=examples("springtune info results/paper", "springtune info dataset.nc --study > again.yaml"))
@@ -70,19 +66,22 @@ def browse(path: Path) -> None:
     click.launch(str(page))
 
 
-@click.command(
-    epilog=examples("springtune archive results/paper", "springtune archive config/paper.yaml --out paper.zip")
-)
-@click.argument("study", type=click.Path(path_type=Path))
+@click.command(epilog=examples("springtune archive results/paper", "springtune archive results/paper --out paper.zip"))
+@click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Zip file to write.  [default: results/<study>.crate.zip]")
 @click.option("--force", is_flag=True, help="Replace a file that is there.")
-def archive(study: Path, out: Path | None, force: bool) -> None:
+def archive(folder: Path, out: Path | None, force: bool) -> None:
     """Pack the results of a study into one zip file, to be cited and handed on.
 
-    STUDY is its YAML file, or results/<study>. The file is an RO-Crate: the study and the files that it names, dataset,
+    FOLDER is results/<study>. The file is an RO-Crate: the study and the files that it names, dataset,
     page, figures, tables, the versions of all packages, and the SHA-256 of every file.
     """
-    found, folder = _study_and_folder(study)
+    from ..studies.kinds import load_study
+    from ..studies.runs.locks import claimed
+
+    config = claimed(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
+    if not config.is_file():
+        raise ValueError(f"{folder}: there is no {config}; give the results/<study> of a study that was run")
     if find_spec("rocrate") is None:
         raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}")
     from ..studies.archive import pack
@@ -92,23 +91,5 @@ def archive(study: Path, out: Path | None, force: bool) -> None:
         raise click.UsageError(f"--out: {target} is no name of a zip file; give one such as {folder.name}.zip")
     if target.exists() and not force:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
-    names = pack(found, folder, target)
+    names = pack(load_study(config), folder, target)
     click.echo(f"{target}: {len(names)} files, {bytes_text(target.stat().st_size)}")
-
-
-def _study_and_folder(given: Path) -> "tuple[Study, Path]":
-    """Study of a YAML file or of a folder of results, and that folder."""
-    from ..studies.kinds import load_study
-    from ..studies.runs.locks import check_claim, claimed
-
-    if given.is_dir():
-        config = claimed(given) or given.parent.parent / CONFIG_FOLDER / f"{given.name}.yaml"
-        if not config.is_file():
-            raise click.ClickException(f"{given}: there is no {config}; give the study's YAML file instead")
-        return load_study(config), given
-    study = load_study(given)
-    folder = Path("results", study.name)
-    if not folder.is_dir():
-        raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
-    check_claim(folder, given)
-    return study, folder

@@ -1,7 +1,6 @@
 """Run a study: check it, find outdated and damaged results, and call Snakemake."""
 
 import os
-import re
 import subprocess
 import sys
 import warnings
@@ -14,7 +13,6 @@ import click
 from ..registry import how_to_install
 from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 from . import examples
-from .options import allow, max_scenes
 
 if TYPE_CHECKING:
     from ..studies.config.model import Study
@@ -28,14 +26,13 @@ if TYPE_CHECKING:
         "springtune run config/mine.yaml --workflow-profile slurm",
     ),
     context_settings={"ignore_unknown_options": True},
-    options_metavar="[--max-scenes N] [--results FOLDER]",
+    options_metavar="[--results FOLDER]",
 )
-@max_scenes
 @click.option(
     "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
 )
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
-def run(most: int | None, results: Path | None, arguments: tuple[str, ...]) -> None:
+def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All options but those
@@ -47,7 +44,6 @@ def run(most: int | None, results: Path | None, arguments: tuple[str, ...]) -> N
     from ..studies.kinds import load_study  # here, so that --help does not wait for it
     from ..studies.runs.rerun import PAPER_STUDIES
 
-    allow(most)
     named = bool(arguments) and not arguments[0].startswith("-")
     options = [*arguments[named:]]
     if "--configfile" in options or "--configfiles" in options:
@@ -69,10 +65,6 @@ def run(most: int | None, results: Path | None, arguments: tuple[str, ...]) -> N
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
-    for place in map(str, (path, folder, source, sys.executable)):
-        if _wants_slurm(options) and not re.fullmatch(ON_SLURM, place):
-            why = "the plugin for Slurm passes paths to a shell without quotes"
-            raise click.UsageError(f"{place!r}: {why}; use letters, digits and @ + = : , . / _ - in its names")
     if results and folder != Path.cwd():
         click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
@@ -186,9 +178,6 @@ def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
         click.echo(f"{why}; {remedy}", err=True)
     return found if found or None not in each else None
 
-
-ON_SLURM = r"[\w@+=:,./-]*"
-"""Paths that a command for Slurm may contain."""
 
 SLURM = "snakemake_executor_plugin_slurm"
 """Package of the plugin; without it Snakemake only reports unknown options of the profile."""

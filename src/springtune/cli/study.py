@@ -11,7 +11,6 @@ from ..safe_io.atomic import write_text
 from ..safe_io.tables import aligned
 from ..studies.runs.source import CONFIG_FOLDER, config_file, is_source_tree
 from . import WrongCall, examples
-from .options import allow, max_scenes
 
 
 @click.command(
@@ -70,20 +69,15 @@ def template_text(path: Path, body: str) -> str:
 
 
 @click.command(
-    epilog=examples(
-        "springtune scenes config/paper.yaml",
-        "springtune scenes --max-scenes 2000000 config/large.yaml",
-    )
+    epilog=examples("springtune scenes config/paper.yaml", "SPRINGTUNE_MAX_SCENES=2e6 springtune scenes large.yaml")
 )
-@max_scenes
 @click.argument("config", type=click.Path(path_type=Path))
-def scenes(config: Path, most: int | None) -> None:
+def scenes(config: Path) -> None:
     """Say what a study asks for, before anything runs.
 
     Counts scenes, meshes, references and curves, and what grids share. A study with mistakes is refused with the line
     of each.
     """
-    allow(most)
     from ..studies.config.kind import kinds
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study  # here, so that --help does not wait for it

@@ -23,7 +23,7 @@ MOST_SCENES = 1_000_000
 """Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
 
 MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"
-"""Variable of the environment with another number; `springtune run` sets it for its jobs."""
+"""Variable of the environment with another number."""
 
 
 def shown_order(name: str, value: float) -> float:

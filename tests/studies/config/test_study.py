@@ -388,7 +388,7 @@ def test_one_range_of_poissons_ratio(refusal, tmp_path, ratio):
         Material(1e9, value, name="m")
     sheet = ["--beam", "40x10", "--size", "5 mm", "--young", "1 GPa", "--poisson", ratio]
     out = ["--definition", "patch", "--out", str(tmp_path / "net.csv")]
-    for call in (["predict", *sheet, "--loads", "traction"], ["springs", *sheet, *out]):
+    for call in (["predict", *sheet, "--load", "traction"], ["springs", *sheet, *out]):
         result = CliRunner().invoke(main, call)
         assert result.exit_code == (0 if legal else 2), result.output
         assert legal or f"--poisson of 'material' is {value}: isotropic materials have -1 < nu <= 0.5" in result.stderr

@@ -128,8 +128,8 @@ class TestChanges:
         lines = result.stdout.splitlines()
         first = lines.index("the largest changes, measured by the tolerance") + 2
         assert lines[first].endswith("100x20, free, 5 mm, bending, patch")  # labels that leave a choice
-        assert lines[first + 3] == "  and 29 more; --all shows them"
-        assert "and 29 more" not in run("diff", *paths, "--all").stdout
+        assert lines[first + 3] == "  and 29 more; --rows shows them"
+        assert "and 29 more" not in run("diff", *paths, "--rows", 32).stdout
         assert ["displacement", "32", "32"] in [line.split()[:3] for line in lines]
 
     def test_what_fails_is_a_status_and_its_values_are_gone(self):

@@ -26,7 +26,7 @@ MOST_CURVE_POINTS = 10_000_000
 
 FEWER = "give shorter lists, or split the study into several"
 
-MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
+MORE_SCENES = f"or allow more by {MOST_SCENES_VARIABLE} in the environment"
 
 ANOTHER = "take another definition, or give each a grid of its own"
 
