@@ -187,7 +187,8 @@ def repository(tmp_path_factory):
     return folder
 
 
-SLOW = {"tune-an-engine.md", "take-results-elsewhere.md", "choose-a-mesh.md", "compare-studies.md", "fit-rubber.md"}
+SLOW = {"tune-an-engine.md", "take-results-elsewhere.md", "choose-a-mesh.md", "compare-studies.md", "fit-rubber.md",
+        "identify-a-sheet.md", "sweep-parameters.md"}  # fmt: skip
 """Of these, which take some seconds each."""
 
 

@@ -35,7 +35,7 @@ boxes = {
 
 
 @pytest.mark.parametrize("mesh_type", MESH_TYPES)
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(**boxes)
 def test_any_box_is_covered_once(mesh_type, length, height, size):
     mesh = MESH_TYPES[mesh_type](length, height, size)
@@ -264,7 +264,7 @@ class TestSlits:
         found = read_beam_mesh(save(tmp_path / "both.vtu", points, {3: triangles, 4: mesh.quads[~half]}), 0.1, 0.02)
         assert (len(found.triangles), len(found.quads)) == (80, 40)
 
-    @settings(max_examples=60)
+    @settings(max_examples=25)
     @given(
         mesh_type=st.sampled_from(sorted(MESH_TYPES)),
         angle=st.floats(0, np.pi),
@@ -290,7 +290,7 @@ class TestSlits:
         else:
             read_beam_mesh(save(path, points, cells), length, height)
 
-    @settings(max_examples=40)
+    @settings(max_examples=20)
     @given(mesh_type=st.sampled_from(sorted(set(MESH_TYPES) - {"braced"})), seed=st.integers(0, 2**32 - 1), **boxes)
     def test_any_hanging_point_is_refused(self, tmp_path_factory, mesh_type, seed, length, height, size):
         """A point on an edge inside that splits one of its two triangles."""

@@ -56,7 +56,7 @@ STARS = some.lists(some.floats(0.5, 1.0), min_size=3, max_size=9)
 
 
 @pytest.mark.filterwarnings("ignore:.*its longer side is")
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12)
 @given(STARS, some.floats(0.05, 0.2), some.floats(0.06, 0.5), some.floats(-3, 3))
 def test_any_star_with_a_hole_is_filled(radii, hole, size, power):
     """Lengths from a micrometre to a kilometre."""
@@ -399,6 +399,7 @@ def test_a_mesh_is_a_sheet_or_says_why_not(tmp_path, name):
         assert read_shape(tmp_path / "own.vtu").mesh.area == mesh.area
 
 
+@settings(max_examples=40)
 @given(some.integers(2, 12), some.integers(1, 8), some.data())
 def test_a_sheet_without_any_of_its_cells_is_a_sheet_unless_cells_meet_in_a_point(cells, rows, data):
     """What is left has holes, or comes apart; all else that it may be is told."""

@@ -154,7 +154,7 @@ class TestWhatClosedFormsGotWrong:
         assert "baudet" not in refused.tried
 
 
-@pytest.mark.parametrize(("seed", "beams"), [(17, 15), pytest.param(18, 200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seed", "beams"), [(17, 6), pytest.param(18, 200, marks=pytest.mark.slow)])
 def test_every_number_is_solved_and_the_first_is_the_best(seed, beams):
     random = np.random.default_rng(seed)
     assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(beams)) > 4 * beams
@@ -217,21 +217,21 @@ class TestWhatScenesSay:
         assert compared(beam, mesh, material, choices, predicted()) >= 3 * len(predicted())
         assert all(one.failures or one.errors["bending"] > -1 for one in choices)
 
-    def test_of_eighty_beams(self):
-        """Of eight shapes, as a reference scales with size, thickness and modulus."""
+    def test_of_random_beams(self):
+        """Of four shapes, as a reference scales with size, thickness and modulus."""
         random, count = np.random.default_rng(14), 0
-        for number in range(8):
+        for number in range(4):
             aspect, material, *_ = random_case(random)
             load = predicted()[number % len(predicted())]
             one = references(Beam(aspect, 1.0, 1.0), Material(1.0, material.poisson_ratio), [load])[load]
-            for largest in (2000, *9 * (200,)):
+            for largest in (1000, *4 * (200,)):
                 beam, mesh_type, size = random_mesh(random, aspect, largest)
                 material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), material.poisson_ratio)
                 mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
                 known = {load: one.scaled(1 / (material.young_modulus * beam.thickness), beam.height)}
                 choices = predict(beam, mesh, material, known, loads=[load])
                 count += compared(beam, mesh, material, [choices[random.integers(len(choices))]], [load])
-        assert count > 72  # some are unstable
+        assert count > 16  # some are unstable
 
 
 class TestLoads:
@@ -325,7 +325,9 @@ def worst_by_scenes(body, mesh, material, about, name):
 
 
 class TestAllDefinitionsCount:
-    @pytest.mark.parametrize("seed", range(8))
+    @pytest.mark.parametrize(
+        "seed", [pytest.param(seed, marks=() if seed in (1, 3, 5) else pytest.mark.slow) for seed in range(8)]
+    )
     def test_nothing_left_out_is_better(self, seed):
         """Of all definitions that are no search and are given nothing, by scenes."""
         body, mesh, material, about = seeded(seed)

@@ -122,8 +122,8 @@ class TestRandomSearches:
 
     def test_meshes_in_between_keep_it_too(self):
         random = np.random.default_rng(8)
-        ratios = np.array([ratio for _ in range(6) for ratio in self.searched(random, 400)])
-        assert len(ratios) >= 3 and (ratios <= 1).all()
+        ratios = np.array([ratio for _ in range(3) for ratio in self.searched(random, 400)])
+        assert len(ratios) >= 2 and (ratios <= 1).all()
 
 
 QUESTIONS = {
@@ -139,7 +139,9 @@ QUESTIONS = {
 class TestBetweenWholeDivisions:
     """Cells are stretched there."""
 
-    @pytest.mark.parametrize("question", QUESTIONS)
+    @pytest.mark.parametrize(
+        "question", [pytest.param(one, marks=() if one in ("area", "patch") else pytest.mark.slow) for one in QUESTIONS]
+    )
     def test_finer_sizes_keep_the_error(self, question):
         beam, nu, error, loads, mesh_type = QUESTIONS[question]
         material = st.Material("210 GPa", nu)

@@ -121,11 +121,10 @@ def test_small_strain_is_the_limit_of_any_shape(kind, stress, nu, aspect_ratio):
 @pytest.mark.parametrize(
     ("nu", "load"),
     [
-        # Each Poisson's ratio once; other loads and the largest one are slow.
+        # Other loads and the largest one are slow.
         (0.3, 1.0),
         (0.5, 1.0),
-        (0.0, 2.0),
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.0, 0.5), (0.5, 2.0), (0.0, 5.0))),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.0, 0.5), (0.0, 2.0), (0.5, 2.0), (0.0, 5.0))),
     ],
 )
 def test_slender_cantilevers_are_elasticas(nu, load):

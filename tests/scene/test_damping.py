@@ -67,8 +67,10 @@ def damped(one, decrement=DECREMENT, step=0.0):
 # -- our integrators ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("over", ["mass", "springs", "both"])
-@pytest.mark.parametrize("definition, load", [("patch", "bending"), ("lattice", "traction"), ("patch", "shear")])
+@pytest.mark.parametrize(
+    "definition, load, over",
+    [("patch", "bending", "mass"), ("lattice", "traction", "springs"), ("patch", "shear", "both")],
+)
 def test_a_released_beam_decays_as_was_measured(definition, load, over):
     """The mode is alone where dampers are proportional. With x = omega h the midpoint rule has periods that are longer
     by x^2 / 12, and decrements that are smaller by x^2 / 6.
@@ -81,8 +83,8 @@ def test_a_released_beam_decays_as_was_measured(definition, load, over):
     assert found.decrement == pytest.approx(DECREMENT * (1 - square / 6), rel=2e-5)
 
 
-@pytest.mark.parametrize("mesh_type", ["right", "structured", "free"])
-@pytest.mark.parametrize("load", ["pressure", "traction", "bending", "shear"])
+@pytest.mark.parametrize("mesh_type", ["right", "free"])
+@pytest.mark.parametrize("load", ["pressure", "bending"])
 @pytest.mark.parametrize("definition", ["area", "delingette"])
 def test_the_loaded_mode_has_the_largest_share_of_all_modes(mesh_type, load, definition):
     beam = st.Beam("200 mm", "20 mm")
