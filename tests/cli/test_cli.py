@@ -308,6 +308,59 @@ class TestPredictAMesh:
         assert "all finer meshes tried, up to twice as fine" in result.stdout and "linear kinematics" in result.stdout
         assert "A definition is given up if its error, by its change over the last doubling" in result.stdout
 
+    def test_what_is_written_is_what_is_said(self, tmp_path):
+        target = tmp_path / "net.json"
+        said = run("predict", *self.FIND, "--write", target).stdout
+        header = json.loads(target.read_text())["header"]
+        best = next(line for line in said.splitlines() if line.startswith("recommended: "))
+        assert header["definition"] in best and f"{header['mesh']['particles']:,} particles" in best
+        assert "net.json: " in said
+
+        target.unlink()
+        said = run("predict", *STEEL, "--size", "5 mm", "--write", target, "--springs-alone")
+        header = json.loads(target.read_text())["header"]
+        assert f"recommended: {header['definition']}; with springs alone: {header['definition']}" in said.stdout
+
+        run("predict", *STEEL, "--size", "5 mm", "--load", "pressure", "--write", target)
+        header, mesh = json.loads(target.read_text())["header"], MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        best = of_one_mesh.predict(Beam(0.1, 0.02), mesh, Material(210e9, 0.3), loads=["pressure"])[0]
+        assert header["definition"] == best.definition
+        assert header["expected_error"] == pytest.approx(best.errors, rel=1e-9)
+
+    def test_an_engine_is_calibrated_to(self, tmp_path):
+        """The text and the springs that are written say the same."""
+        asked = [
+            *("--engine", "xpbd", "--dt", "1/60", "--substeps", "20", "--beam", "200x40", "--size", "20 mm"),
+            *("--material", "rubber", "--density", "1000 kg/m^3", "--load", "traction,shear", "--force", "0.2 N"),
+            *("--definition", "patch"),
+        ]
+        target = tmp_path / "net.json"
+        text = run("predict", *asked, "--write", target)
+        assert text.exit_code == 0, text.output
+        lines, written = words(text.stdout), json.loads(target.read_text())
+        assert lines[1] == "engine xpbd, dt 1/60 s, 20 substeps, 10 iterations, float64"
+        assert lines[2] == f"factor {written['header']['calibrated']['factor']:.5g}"
+        compliance = re.fullmatch("type compliance ([^ ]+) to ([^ ]+) m/N: 1 / k of a spring", lines[3])
+        least, most = map(float, compliance.groups())
+        assert 1 / max(written["stiffness"]) == pytest.approx(least, rel=1e-4)
+        assert 1 / min(written["stiffness"]) == pytest.approx(most, rel=1e-4)
+
+    def test_a_setting_without_a_factor_writes_nothing(self, tmp_path):
+        asked = [
+            *("--engine", "xpbd", "--beam", "200x40", "--size", "20 mm", "--material", "rubber", "--force", "0.2 N"),
+            *("--density", "1000 kg/m^3", "--load", "traction", "--definition", "lattice"),
+        ]
+        result = run("predict", *asked, "--write", tmp_path / "net.csv")
+        assert "in 4 orders of the same particles" in result.stdout and "take more substeps" in result.stdout
+        assert result.exit_code == 1 and not [*tmp_path.iterdir()]
+        assert result.stderr.startswith("Error: --write: there is no factor, so nothing is written: the error at dt")
+
+    @pytest.mark.parametrize("command", ["predict", "springs"])
+    def test_help_has_the_ending_of_every_format(self, command):
+        said = run(command, "--help").stdout
+        for ending in (*NET_FORMATS, ".xml", ".mjcf", ".scn", ".py", ".newton.py", ".xpbd.json"):
+            assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
+
     @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
     @pytest.mark.parametrize(
         ("beam", "asked", "value"),
