@@ -203,15 +203,13 @@ class Pattern:
 
     def blocks(self, couplings: np.ndarray) -> Blocks:
         """Return the tangent in blocks, as `coupling_entries`, with zeros where directions are held."""
-        held: np.ndarray = self.number < 0
+        free: np.ndarray = self.number >= 0
         blocks = np.ascontiguousarray(couplings.reshape(4, -1).T)
         diagonal = np.ascontiguousarray(self._own(couplings).T)
-        fixed = np.flatnonzero(held.any(axis=1)[self.springs].any(axis=1))
-        free = ~held[self.springs[fixed]]
-        blocks[fixed] *= (free[:, 0, :, None] & free[:, 1, None, :]).reshape(-1, 4)
-        particles = np.flatnonzero(held.any(axis=1))
-        free = ~held[particles]
-        diagonal[particles] *= np.stack([free[:, 0], free.all(axis=1), free[:, 1]], axis=1)
+        held = np.flatnonzero(~(free[:, 0] & free[:, 1]))
+        diagonal[held] *= np.stack([free[held, 0], free[held].all(axis=1), free[held, 1]], axis=1)
+        near = np.flatnonzero(np.isin(self.springs, held).any(axis=1))
+        blocks[near] *= (free[self.first[near], :, None] & free[self.second[near], None, :]).reshape(-1, 4)
         return Blocks(row_pointers(self.first, self.shape[0]), self.second.astype(np.int32), blocks, diagonal)
 
     def entries(self, particles: np.ndarray, matrices: np.ndarray) -> np.ndarray:
