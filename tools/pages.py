@@ -35,7 +35,7 @@ SIZES = ("up to 0.05", "0.05 to 0.1", "above 0.1")
 """Mesh sizes over the height of the beam, as tables of definitions name them."""
 
 APPROACHES = ("quadratic-triangles", "linear-triangles", "calculix-cps3", "calculix-cps8", "condensation",
-              "delingette/free", "area/braced", "patch/free", "patch/structured", "lattice/free",
+              "boundary-elements", "delingette/free", "area/braced", "patch/free", "patch/structured", "lattice/free",
               "lattice/braced")  # fmt: skip
 """Approaches of the tables of the benchmark."""
 

@@ -30,10 +30,10 @@ SCENES = {
     "block": LoadedBeam(BEAM, Material(1e6, 0.49, 1000.0, "rubber"), "pressure", -10.0),
 }
 CLOSE = {
-    # largest error at 2 mm, ten rows: linear triangles; quadratic
-    "traction": (5e-4, 1e-4),
-    "bending": (2e-2, 5e-4),
-    "block": (2e-3, 3e-4),
+    # largest error at 2 mm, ten rows: linear triangles; quadratic; constant boundary elements; no physics
+    "traction": (5e-4, 1e-4, 1e-3, 5e-3),
+    "bending": (2e-2, 5e-4, 0.6, 3e-2),
+    "block": (2e-3, 3e-4, 1e-2, 0.3),
 }
 
 
@@ -62,8 +62,9 @@ def references():
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_other_approach_comes_near_the_reference(name, references):
-    linear, quadratic = CLOSE[name]
-    allowed = dict.fromkeys(OTHER_APPROACHES, linear) | {"quadratic-triangles": quadratic}
+    linear, quadratic, boundary, free = CLOSE[name]
+    allowed = dict.fromkeys(OTHER_APPROACHES, linear)
+    allowed |= {"quadratic-triangles": quadratic, "boundary-elements": boundary, "free-form": free}
     for approach in OTHER_APPROACHES:
         if approach.startswith("calculix"):
             continue
@@ -74,9 +75,16 @@ def test_every_other_approach_comes_near_the_reference(name, references):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_ways_to_linear_triangles_agree(name):
-    """scikit-fem, condensed responses and springs with coupling are one."""
+    """scikit-fem, vertex and edge tensors, condensed responses and springs with coupling are one."""
     first, _ = answer(SCENES[name], "linear-triangles", 4e-3)
-    assert answer(SCENES[name], "condensation", 4e-3)[0] == pytest.approx(first, rel=1e-6)
+    for approach in ("tensor-mass", "condensation"):
+        assert answer(SCENES[name], approach, 4e-3)[0] == pytest.approx(first, rel=1e-6), approach
+
+
+def test_boundary_elements_converge(references):
+    errors = [abs(answer(SCENES["bending"], "boundary-elements", size)[0] / references["bending"] - 1)
+              for size in (4e-3, 2e-3, 1e-3)]  # fmt: skip
+    assert errors[0] > 1.3 * errors[1] > 1.3**2 * errors[2]
 
 
 @pytest.mark.skipif(not calculix.program(), reason="needs CalculiX (ccx; Debian package calculix-ccx)")
@@ -87,15 +95,13 @@ def test_calculix_takes_part(name, references):
 
 
 def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
-    approaches = approach_names(
-        ["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "condensation"]
-    )
+    approaches = approach_names(["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "free-form"])
     assert approaches == (
         "lattice/structured",
         "lattice/braced",
         "delingette/structured",
         "linear-triangles",
-        "condensation",
+        "free-form",
     )
     found = measured(approaches, (2e-3, 5e-3, 1e-2), [1e-2, *[2e-3] * 4])
     seconds = found.seconds.values
@@ -118,7 +124,7 @@ def test_a_case_that_fails_is_a_hole_that_says_so(error, status, message, monkey
     def approach(scene, size, clock):
         if size < 4e-3:
             raise error
-        return APPROACHES["linear-triangles"](scene, size, clock)
+        return APPROACHES["free-form"](scene, size, clock)
 
     monkeypatch.setitem(APPROACHES, "condensation", approach)
     sizes = (2e-3, 5e-3)

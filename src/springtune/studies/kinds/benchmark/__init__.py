@@ -5,7 +5,16 @@ from collections.abc import Iterable, Sequence
 from springtune.mesh.types import MESH_TYPES
 from springtune.springs.base import DEFINITIONS
 
-OTHER_APPROACHES = ("linear-triangles", "quadratic-triangles", "condensation", "calculix-cps3", "calculix-cps8")
+OTHER_APPROACHES = (
+    "linear-triangles",
+    "quadratic-triangles",
+    "tensor-mass",
+    "condensation",
+    "boundary-elements",
+    "free-form",
+    "calculix-cps3",
+    "calculix-cps8",
+)
 """Approaches of the benchmark besides definitions, see `springtune.studies.kinds.benchmark.approaches`."""
 
 PARTS = ("meshing", "assembling", "factorizing", "solving")

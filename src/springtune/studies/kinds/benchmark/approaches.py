@@ -1,4 +1,4 @@
-"""Other ways to a beam's displacement, for the benchmark: finite elements, CalculiX and pre-computed responses.
+"""Other ways to a beam's displacement, for the benchmark: those of the paper, and plain finite elements.
 
 Each takes a scene, a mesh size and a clock, and returns the displacement of the loaded side and the number of unknowns.
 All are linear.
@@ -9,6 +9,8 @@ from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import LinearOperator, cg
 
 from springtune.linalg.factors import factorize
 from springtune.mesh.rows import structured
@@ -97,6 +99,60 @@ def triangles(scene, size, clock, degree):
     return float(mean @ solution), len(free)
 
 
+def tensor_mass(scene, size, clock):
+    """Linear triangles stored as tensors of particles and edges, forces gathered edge by edge.
+
+    S. Cotin, H. Delingette, N. Ayache, Visual Computer 16:437, 2000; here in balance, by conjugate gradients.
+    """
+    mesh = _mesh(scene, size, clock)
+    with clock("assembling"):
+        young, nu = scene.sheet.young_modulus, scene.sheet.poisson_ratio
+        lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))
+        corners = mesh.points[mesh.triangles]
+        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+        slopes = np.stack([-opposite[..., 1], opposite[..., 0]], axis=2)
+        double = opposite[:, 0, 0] * opposite[:, 1, 1] - opposite[:, 0, 1] * opposite[:, 1, 0]
+        slopes = slopes / double[:, None, None]
+        volume = 0.5 * np.abs(double) * scene.beam.thickness
+
+        def tensor(i, j):
+            a, b = slopes[:, i], slopes[:, j]
+            outer = a[:, :, None] * b[:, None, :]
+            inner = np.einsum("ni,ni->n", a, b)[:, None, None] * np.eye(2)
+            return volume[:, None, None] * (lam * outer + mu * outer.transpose(0, 2, 1) + mu * inner)
+
+        of_particles = np.zeros((len(mesh.points), 2, 2))
+        of_edges = np.zeros((len(mesh.edges), 2, 2))
+        for i in range(3):
+            np.add.at(of_particles, mesh.triangles[:, i], tensor(i, i))
+            j, k = (i + 1) % 3, (i + 2) % 3
+            ordered = mesh.triangles[:, j] < mesh.triangles[:, k]
+            found = np.where(ordered[:, None, None], tensor(j, k), tensor(k, j))
+            np.add.at(of_edges, mesh.cell_edges[3][:, i], found)
+        first, second = mesh.edges.T
+        moving = ~held(mesh, scene.kind)
+        load = scene.force * weights(mesh, scene.kind) * moving
+        diagonal = np.einsum("nii->ni", of_particles)
+
+    def forces(flat):
+        u = flat.reshape(load.shape)
+        total = np.einsum("nij,nj->ni", of_particles, u)
+        to_first = np.einsum("nij,nj->ni", of_edges, u[second])
+        to_second = np.einsum("nji,nj->ni", of_edges, u[first])
+        for axis in range(2):
+            total[:, axis] += np.bincount(first, to_first[:, axis], len(u))
+            total[:, axis] += np.bincount(second, to_second[:, axis], len(u))
+        return (total * moving).ravel()
+
+    with clock("solving"):
+        shape = (load.size, load.size)
+        stiffness, inverse = LinearOperator(shape, forces), diags_array(1 / diagonal.ravel())
+        u, left = cg(stiffness, load.ravel(), rtol=1e-8, maxiter=20 * len(load), M=inverse)
+        if left:
+            raise ArithmeticError("conjugate gradients did not end")
+    return float(np.tensordot(u.reshape(load.shape), measured(mesh, scene.kind), axes=2)), int(moving.sum())
+
+
 def condensation(scene, size, clock):
     """Responses of the loaded side to unit loads, computed once (``factorizing``); a load then costs a product."""
     mesh = _mesh(scene, size, clock)
@@ -120,6 +176,90 @@ def condensation(scene, size, clock):
         responses @ forces
         displacement = float(of_watched @ forces)
     return displacement, len(loaded)
+
+
+def boundary_elements(scene, size, clock):
+    """Constant boundary elements with Kelvin's solution.
+
+    C. A. Brebbia, J. Dominguez, Boundary elements, 1992, ch. 3; plane stress by nu / (1 + nu) in plane strain's place.
+    """
+    length, height = scene.beam.length, scene.beam.height
+    with clock("meshing"):
+        columns, rows = max(2, round(length / size)), max(2, round(height / size))
+        x, y = np.linspace(0, length, columns + 1), np.linspace(0, height, rows + 1)
+        around = [np.stack([x[:-1], 0 * x[:-1]], 1), np.stack([0 * y[:-1] + length, y[:-1]], 1)]
+        around += [np.stack([x[:0:-1], 0 * x[:0:-1] + height], 1), np.stack([0 * y[:0:-1], y[:0:-1]], 1)]
+        start = np.concatenate(around)
+        end = np.roll(start, -1, axis=0)
+        lengths = np.linalg.norm(end - start, axis=1)
+        along = (end - start) / lengths[:, None]
+        normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        middle = 0.5 * (start + end)
+        side = np.repeat(np.arange(4), [columns, rows, columns, rows])  # lower, right, upper, left
+    with clock("assembling"):
+        nu = scene.sheet.poisson_ratio / (1 + scene.sheet.poisson_ratio)
+        shear = scene.sheet.young_modulus / (2 * (1 + scene.sheet.poisson_ratio))
+        count = len(middle)
+        u, t = np.zeros((2, count, 2, count, 2))
+        places, shares = np.polynomial.legendre.leggauss(8)
+        for place, share in zip(places, shares):
+            points = middle + 0.5 * place * (end - start)
+            r = points[None, :, :] - middle[:, None, :]
+            distance = np.linalg.norm(r, axis=2)
+            np.fill_diagonal(distance, 1.0)
+            r = r / distance[..., None]
+            scale = 0.5 * share * lengths[None, :]
+            across = np.einsum("ijk,jk->ij", r, normal)
+            outer = r[..., :, None] * r[..., None, :]
+            kelvin = outer + (3 - 4 * nu) * np.log(1 / distance)[..., None, None] * np.eye(2)
+            turned = r[..., :, None] * normal[None, :, None, :] - r[..., None, :] * normal[None, :, :, None]
+            push = across[..., None, None] * ((1 - 2 * nu) * np.eye(2) + 2 * outer) - (1 - 2 * nu) * turned
+            u += (scale[..., None, None] * kelvin / (8 * np.pi * shear * (1 - nu))).transpose(0, 2, 1, 3)
+            t -= ((scale / distance)[..., None, None] * push / (4 * np.pi * (1 - nu))).transpose(0, 2, 1, 3)
+        own = np.arange(count)
+        logs = lengths * (1 - np.log(lengths / 2)) * (3 - 4 * nu)
+        itself = logs[:, None, None] * np.eye(2) + lengths[:, None, None] * along[:, :, None] * along[:, None, :]
+        u[own, :, own, :] = itself / (8 * np.pi * shear * (1 - nu))
+        t[own, :, own, :] = 0.5 * np.eye(2)
+        u, t = u.reshape(2 * count, -1), t.reshape(2 * count, -1)
+        clamped = np.repeat(side == (0 if scene.kind.normal == 1 else 3), 2)
+        loaded = side == (2 if scene.kind.normal == 1 else 1)
+        axis = scene.kind.axis
+        traction = np.zeros((count, 2))
+        traction[loaded, axis] = scene.force / (scene.beam.thickness * lengths[loaded].sum())
+        matrix = np.where(clamped[None, :], -u, t)
+        right = u[:, ~clamped] @ traction.ravel()[~clamped]
+    with clock("factorizing"):
+        solution = np.linalg.solve(matrix, right)
+    with clock("solving"):
+        moved = np.where(clamped, 0.0, solution).reshape(-1, 2)[:, axis]
+        if scene.kind.pressed:
+            displacement = _middle(scene, middle[loaded, scene.kind.along], moved[loaded])
+        else:
+            displacement = float(moved[loaded] @ lengths[loaded] / lengths[loaded].sum())
+    return displacement, 2 * count
+
+
+def free_form(scene, size, clock):
+    """Free-form deformation by Bernstein polynomials: no physics, the end is put where the theory of bars has it.
+
+    T. W. Sederberg, S. R. Parry, Computer Graphics 20(4):151, 1986.
+    """
+    beam, young = scene.beam, scene.sheet.young_modulus
+    mesh = _mesh(scene, size, clock)
+    with clock("solving"):
+        across, axis = scene.kind.normal, scene.kind.axis
+        far, side = (beam.length, beam.height)[across], scene.kind.side_length(beam)
+        given = (far if scene.kind.direct else 4 * far**3) / (
+            young * beam.thickness * (side if scene.kind.direct else side**3)
+        )
+        # Cubic: control points along the axis that carry a straight line, or a cantilever's cubic.
+        control = np.array([0, 0, 0.5, 1.0]) if not scene.kind.direct else np.linspace(0, 1, 4)
+        s = mesh.points[:, across] / mesh.points[:, across].max()
+        basis = np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=1)
+        moved = np.zeros(mesh.points.shape)
+        moved[:, axis] = scene.force * given * basis @ control
+    return float(np.tensordot(moved, measured(mesh, scene.kind), axes=2)), 8
 
 
 def calculix_cps3(scene, size, clock):
@@ -155,7 +295,10 @@ def calculix_cps8(scene, size, clock):
 APPROACHES = {
     "linear-triangles": partial(triangles, degree=1),
     "quadratic-triangles": partial(triangles, degree=2),
+    "tensor-mass": tensor_mass,
     "condensation": condensation,
+    "boundary-elements": boundary_elements,
+    "free-form": free_form,
     "calculix-cps3": calculix_cps3,
     "calculix-cps8": calculix_cps8,
 }

@@ -10,7 +10,7 @@ from ...output.selection import choose, group
 from .outputs import figures
 
 SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
-         "condensation", "calculix-cps3", "calculix-cps8")  # fmt: skip
+         "boundary-elements", "tensor-mass", "calculix-cps3", "calculix-cps8")  # fmt: skip
 """Approaches with names before others, which are grey."""
 
 RING = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}

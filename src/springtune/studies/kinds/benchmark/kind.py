@@ -57,7 +57,8 @@ class BenchmarkConfig(Section):
     """Mesh types."""
 
     approach: OneOrMore[OtherApproach] = Field(list(OTHER_APPROACHES))
-    """Finite elements, CalculiX if installed, pre-computed responses. All by default."""
+    """Finite elements, CalculiX if installed, tensor-mass, pre-computed responses, boundary elements, free-form
+    deformation. All by default."""
 
     mesh_size: OneOrMore[fields.Length]
     """Lengths of edges."""
