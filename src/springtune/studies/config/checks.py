@@ -19,6 +19,9 @@ from .messages import Key, Problems, part_of, show
 from .model import Grid
 from .sections import StatedStiffness, StudyConfig
 
+PLAUSIBLE_FACTOR = 20.0
+"""Factor on sqrt(3)/2 E t beyond which a stated stiffness is an error of units, as the paper's 170E6 N/mm."""
+
 MOST_CELLS = 2_500_000
 """Limit of label combinations over all dimensions, requested or not."""
 
@@ -239,15 +242,25 @@ def check_able(
 
 def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Problems) -> None:
     """Check that definitions fit the cells and loads of their grids, and that the study states what they need."""
-    stated = {(row.mesh_type, row.material) for row in stated_rows(config)}
+    stated = {(row.mesh_type, row.material): (number, row.value) for number, row in enumerate(stated_rows(config))}
     for grid in grids:
         path = ("grids", grid.name, "definition")
         for name, mesh_type, load in dict.fromkeys((s.definition, s.mesh.mesh_type, s.load) for s in grid.scenes):
             check_able(problems, path, [name], [mesh_type], [load], derived=False)
             if name == "calibrated" and not config.definitions.calibrated:
                 problems.add(path, "'calibrated' needs to know on what; add definitions.calibrated, a beam and a load")
-        paper = {(scene.mesh.mesh_type, scene.material.name) for scene in grid.scenes if scene.definition == "paper"}
-        for mesh_type, material in sorted(paper - stated):
-            example = f"{{mesh_type: {mesh_type}, material: {material}, value: <stiffness> N/m}}"
-            lack = f"'paper' has no stiffness for {mesh_type} meshes of {material}"
-            problems.add(path, f"{lack}; add {example} to definitions.paper.stiffness")
+        paper = (scene for scene in grid.scenes if scene.definition == "paper")
+        for mesh_type, material, thickness in dict.fromkeys(
+            (scene.mesh.mesh_type, scene.material, scene.mesh.beam.thickness) for scene in paper
+        ):
+            number, value = stated.get((mesh_type, material.name), (0, None))
+            expected = COEFFICIENT * material.young_modulus * thickness
+            if value is None:
+                example = f"{{mesh_type: {mesh_type}, material: {material.name}, value: <stiffness> N/m}}"
+                lack = f"'paper' has no stiffness for {mesh_type} meshes of {material.name}"
+                problems.add(path, f"{lack}; add {example} to definitions.paper.stiffness")
+            elif not expected / PLAUSIBLE_FACTOR <= value <= expected * PLAUSIBLE_FACTOR:
+                place, written = part_of(problems.content, ("definitions", "paper", "stiffness", number, "value"))
+                sheet = f"{material.name}, {1e3 * thickness:g} mm thick and of {material.young_modulus:.4g} Pa"
+                why = f"{show(written)} cannot be meant: sqrt(3)/2 E t of {sheet}, is {expected:.4g} N/m"
+                problems.add(place, f"{why}; give a stiffness near that, in N/m")
