@@ -9,7 +9,7 @@ import pytest
 
 import springtune as st
 from springtune.studies.kinds.bodies import plan
-from springtune.studies.kinds.bodies.errors import like_with_like
+from springtune.studies.kinds.bodies.tables import like_with_like
 from springtune.studies.kinds.moduli.outputs import tables
 from springtune.studies.runs.provenance import inputs
 

@@ -5,6 +5,7 @@ from matplotlib.lines import Line2D
 
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import with_unit
+from springtune.springs.lattice import COEFFICIENT
 
 from ...config.kind import distinct
 from ...output import labels, style
@@ -14,7 +15,6 @@ from ...output.selection import (
     cells,
     choose,
     group,
-    in_plane_ratio,
     labelled_beam,
     labels_of,
     last_swept,
@@ -285,48 +285,46 @@ def plot_deformed(
     chosen = {one: selection[one] for one in ("material", "load")}
     values = {name: value.sel(chosen) for name, value in values.items()}
     cut = at(cut, values)
-    extents = [extent(plane(fields.sel(beam=name), "outline_{}"), (5.0, 1.0)) for name in beams]
-    room = style.COLUMN - 0.42 - 0.08
-    heights = [float(np.clip(1.25 * room * high / wide, 0.45, 1.8)) for wide, high in extents]
-    figure, axes = style.panels(
-        ax, len(beams), figsize=(style.COLUMN, 0.5 + sum(heights) + 0.65 * len(beams)), height_ratios=heights
-    )
-    for panel, name in zip(axes[:, 0], beams):
+    shown = {}
+    for name in beams:
         words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
-        _deformed(panel, fields.sel(beam=name), cut.sel(beam=name), selection, ", ".join(words))
-    labels.entitle(figure, ", ".join(named(selection, "mesh_type", "material", "load")),
-                   f"lines: network ({definition}); grey: reference; dashed: at rest")  # fmt: skip
-    return axes[:, 0]
+        shown[", ".join(words)] = fields.sel(beam=name).sel(chosen), cut.sel(beam=name)
+    extents = [extent(plane(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
+    height = max(float(np.clip((style.PAGE - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
+    said = f"lines: network ({definition}); grey: reference; dashed: at rest"
+    title = ", ".join(named(selection, "mesh_type", "material", "load"))
+    return labels.small_multiples(ax, shown, 1, 0.75 + height, title, _deformed, said=said)
 
 
-def _deformed(panel, fields, root, selection, beam):
-    load = {"material": selection["material"], "load": selection["load"]}
+def _deformed(panel, part):
+    """Draw the network of a beam; return notes."""
+    fields, root = part
     # Of the meshes that this beam has, the one that this load is asked for on.
-    for known in (fields.displacement_x.sel(load), fields.x.where(root.status != 0), fields.x):
+    for known in (fields.displacement_x, fields.x.where(root.status != 0), fields.x):
         places = np.flatnonzero(known.notnull().any("particle").values)
         if len(places):
             break
-    here = fields.isel(mesh_size=places[-1] if len(places) else 0).sel(load)
-    scale = magnification(here)
+    here = fields.isel(mesh_size=places[-1] if len(places) else 0)
+    scale, flag = magnification(here), int(root.status.sel(mesh_size=here.mesh_size.values))
     draw_network(panel, here, scale)
-    referred = np.isfinite(here.reference_displacement_x.values).any()
-    beyond = int(root.get("reference_applies", 1)) == 0
-    lacking = ["no reference"] if not referred else [f"reference {BEYOND_SMALL_STRAIN}"] if beyond else []
-    flag = int(root.status.sel(mesh_size=here.mesh_size.values))
-    status = in_words(flag) or "not asked for"
-    if not np.isfinite(here.displacement_x.values).any():
-        labels.say(panel, f"no network: {status}" if flag != 1 else "no network stored", bare=False)
-    elif flag not in (0, 1):
-        lacking.append(status)
-    text = f"{beam}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
-    panel.set_title(labels.fitted(panel, [", ".join([text, *lacking])], 8))
+    text = f"{panel.get_title('left')}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
+    panel.set_title(labels.fitted(panel, [text], 8))
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
+    beyond = [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
+    notes = beyond if here.reference_displacement_x.notnull().any() else ["no reference"]
+    if not here.displacement_x.notnull().any():
+        notes.append(f"no network: {in_words(flag) or 'not asked for'}" if flag != 1 else "no network stored")
+    elif flag not in (0, 1):
+        notes.append(in_words(flag))
+    return notes, ""
 
 
 # -- the pressed block -------------------------------------------------------------------------------------------------
 
 ENERGIES = ("area", "delingette")
+"""Definitions whose largest error over all loads is shown."""
+
 BLOCK_SHOWN = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
 """Definitions whose pressed faces are shown before others."""
 
@@ -412,109 +410,63 @@ def _stiffness(panel, curves, root):
     panel.set_title("One stiffness for all loads? (small strain)")
     if curves is None or "linear" not in curves.kinematics.values:
         return [], "The study has no sensitivity curves in linear kinematics of this mesh and material."
-    curves, said = curves.sel(kinematics="linear"), []
-    loads = labels_of(curves.status != 0, "load")
+    curves = curves.sel(kinematics="linear")
+    asked = labels_of(curves.status != 0, "load")
+    loads = [load for load in asked if curves.deformation_error.sel(load=load).notnull().any()]
+    said = [f"{load}: no error" for load in asked if load not in loads]
+    if not loads:
+        return [], "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
     known = curves.stiffness.values[np.isfinite(curves.stiffness.values)]
     for number, load in enumerate(loads):
-        curve = curves.sel(load=load)
-        if curve.deformation_error.notnull().any():
-            draw_curve(panel, curve, 1.0, load, style.line(number), known)
-        else:
-            said.append(f"{load}: {'not solved' if curve.displacement.isnull().all() else 'no reference'}")
-    if not panel.get_lines():
-        return [], "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
-    middle = np.sqrt(3) / 2 * _membrane(curves)
+        draw_curve(panel, curves.sel(load=load), 1.0, load, style.line(number), known)
+    middle = COEFFICIENT * np.nanmax((curves.stiffness / curves.stiffness_ratio).values)
     low, high = max(0.7 * middle, known.min()), min(1.5 * middle, known.max())
     within = (curves.stiffness >= low) & (curves.stiffness <= high)
     highest = 100 * float(abs(curves.deformation_error).where(within).max())
-    for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
-        cells = root.sel(definition=definition, kinematics="linear", load=loads)
-        errors = 100 * np.abs(cells.deformation_error.values)
-        known, flags = np.isfinite(errors), cells.status.values
-        lacking = [f"{load} {in_words(flag) or 'not asked for'}"
-                   for load, flag, there in zip(loads, flags, known) if not there]  # fmt: skip
-        if lacking and (flags != 0).any():
-            said.append(f"{definition}: {', '.join(lacking)}")
-        if known.any():
-            look = style.line(len(loads) + number) | {"marker": ""}
-            worst = errors[known].max()
-            panel.plot([low, high], [worst, worst], label=f"{definition}, worst: {worst:.2g} %", **look)
+    networks = root.sel(kinematics="linear", load=asked)
+    for number, name in enumerate(labels_of(networks.status.sel(definition=networks.definition.isin(ENERGIES)) != 0,
+                                            "definition")):  # fmt: skip
+        errors = 100 * np.abs(networks.deformation_error.sel(definition=name).values)
+        if np.isfinite(errors).all():
+            worst, look = errors.max(), style.line(len(loads) + number) | {"marker": ""}
+            panel.plot([low, high], [worst, worst], label=f"{name}, worst: {worst:.2g} %", **look)
+        else:
+            said.append(f"{name}: not solved for all loads")
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
-    _marks(panel, curves, root)
+    stated = networks.stiffness.sel(definition=networks.definition == "paper").values
+    for value in np.unique(stated[np.isfinite(stated)]):
+        panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1,
+                      label=f"as stated: {value:.4g}")  # fmt: skip
     return said, ""
-
-
-def _membrane(curves):
-    """E t of the sheet [N/m], in plane strain E t / (1 - nu^2)."""
-    return np.nanmax((curves.stiffness / curves.stiffness_ratio).values, initial=0.0)
-
-
-def _marks(panel, curves, root):
-    """Mark stiffnesses by closed form and as stated."""
-    marks, middle = {}, np.sqrt(3) / 2 * _membrane(curves)
-    if "paper" in root.definition.values:
-        stated = root.stiffness.sel(definition="paper").values
-        stated = stated[np.isfinite(stated)]
-        if len(stated):
-            printed = "paper_stiffness" in root and np.isfinite(root.paper_stiffness.values).any()
-            marks[f"{'the paper’s' if printed else 'as stated'}: {stated[0]:.4g}"] = stated[0]
-    if str(root.mesh_type.values) == "structured" and middle > 0:
-        strained = "material_plane" in root and root.material_plane == "strain"
-        marks[f"√3/2 {'E/(1−ν²)' if strained else 'E'} t: {middle:.4g}"] = middle
-        # Held sideways, a sheet's modulus is E / (1 - nu^2), and that of a network, whose nu is 1/3, 9/8 E.
-        held = middle / (1 - float(in_plane_ratio(root)) ** 2) / (9 / 8)
-        if abs(held / middle - 1) > 0.02:
-            marks[f"of a held block: {held:.4g}"] = held
-    low, high = panel.get_xlim()
-    for dash, (text, value) in enumerate(marks.items(), start=1):
-        if low < value < high:
-            panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (dash, dash)), zorder=1, label=text)
 
 
 def _profile(panel, block, root, load):
     """Draw the pressed face over the reference of its kinematics; returns as `_stiffness`."""
-    x, pressed, said, highest = block.face_position.values, block.sel(load=load), [], []
+    x, pressed, said = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
-    of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])
+    solved = pressed.face_profile.notnull().any("face_position")
     law = own_law(pressed, "reference_face_profile")
-    finite = bool(
-        law
-        and np.isfinite(pressed.reference_face_profile.sel(reference=law).values).any()
-        and of_networks.sel(kinematics=of_networks.kinematics != "linear").any()
+    finite = bool(law) and bool(
+        pressed.reference_face_profile.sel(reference=law).notnull().any()
+        and solved.sel(kinematics=solved.kinematics != "linear").any()
     )
-    kind = law if finite else str(block.reference.values[0])
     panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)")
-    profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
-    if np.isfinite(profile).any():
-        name = f"reference, {kind.replace('-', ' ')}"
-        panel.plot(x, profile, color="0.72", linewidth=3, label=name)
-        highest.append(profile)
-    order = [name for name in BLOCK_SHOWN if name in block.definition.values]
-    order += [name for name in block.definition.values if name not in order]
-    asked = [name for name in order if (root.status.sel(load=load, definition=name) != 0).any()]
-    shown = []
-    for definition in asked:
-        profiles = pressed.face_profile.sel(definition=definition)
-        usual = ("nonlinear",) if finite else ("linear", "nonlinear")
-        solved = [one for one in usual if one in profiles.kinematics.values
-                  and np.isfinite(profiles.sel(kinematics=one).values).any()]  # fmt: skip
-        if solved:
-            shown.append((definition, solved[0], -1e3 * profiles.sel(kinematics=solved[0]).values))
+    kind = law if finite else str(block.reference.values[0])
+    profiles = {f"reference, {kind.replace('-', ' ')}": pressed.reference_face_profile.sel(reference=kind)}
+    asked = labels_of(root.status.sel(load=[load]) != 0, "definition")
+    for definition in sorted(asked, key=lambda name: (name not in BLOCK_SHOWN, asked.index(name))):
+        usual = [one for one in (("nonlinear",) if finite else ("linear", "nonlinear")) if one in solved.kinematics]
+        drawn = [one for one in usual if solved.sel(definition=definition, kinematics=one)]
+        if drawn and len(profiles) <= MOST_FACES:
+            profile = pressed.face_profile.sel(definition=definition, kinematics=drawn[0])
+            profiles[f"{definition}, {drawn[0]}"] = profile
         else:
-            flags = root.status.sel(load=load, definition=definition)
-            words = in_words(flags.where(flags.kinematics.isin(usual), 0).values) or "not asked for"
-            said.append(f"{definition}: {words}")
-    for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
-        look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
-        panel.plot(x, profile, label=name, **look)
-        highest.append(profile)
-    if not finite and any(kinematics != "linear" for _, kinematics, _ in shown[:MOST_FACES]):
+            flags = root.status.sel(load=load, definition=definition, kinematics=usual).values
+            said.append(f"{definition}: {'in the dataset' if drawn else in_words(flags) or 'not asked for'}")
+    looks = [{"color": "0.72", "linewidth": 3}, *(style.line(number) | {"marker": ""} for number in range(MOST_FACES))]
+    for (name, profile), look in zip(profiles.items(), looks):
+        panel.plot(x, -1e3 * profile.values, label=name, **look)
+    if not finite and any(name.endswith("nonlinear") for name in profiles):
         said.append("the reference is of small strain, not all networks are: add further_references")
-    if len(shown) > MOST_FACES:
-        said.append(f"in the dataset, too: {', '.join(name for name, _, _ in shown[MOST_FACES:])}")
-    if not highest:
-        return [], "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
-    low, high = min(map(np.nanmin, highest)), max(map(np.nanmax, highest))
-    panel.set_xlim(x.min() - 0.02, x.max() + 0.02)
-    panel.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low) if high > low else high + 1)
-    return said, ""
+    panel.margins(x=0.02, y=0.08)
+    return said, "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])

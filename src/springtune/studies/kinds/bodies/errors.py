@@ -7,30 +7,15 @@ from springtune.problem.parameters import SWEPT
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import BEYOND_SMALL_STRAIN, in_words
-from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law, sign_of_errors
+from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, sign_of_errors
 from .beam_figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
+from .tables import like_with_like
 
 MOST_LINES = 6
 """Definitions in one panel; more of them take further rows of panels."""
 
 # -- what both have ----------------------------------------------------------------------------------------------------
-
-
-def like_with_like(data):
-    """Root of a dataset; errors of nonlinear networks are against finite strain where that is known.
-
-    `beyond` says where small strain does not apply, so that an error is not the network's alone.
-    """
-    root = group(data, "/")
-    root = root.assign(beyond=root.reference_applies == 0 if "reference_applies" in root else root.status < 0)
-    finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
-    finite = None if finite is None else of_own_law(finite)
-    if finite is None:
-        return root
-    errors, linear = finite.deformation_error, root.kinematics == "linear"
-    errors = root.deformation_error.where(linear, errors).transpose(*root.deformation_error.dims)
-    return root.assign(deformation_error=errors, beyond=root.beyond & linear).assign_attrs(finite_strain=True)
 
 
 def compared(root, selection):
@@ -75,7 +60,7 @@ def _lines(panel, places, here, looks, listed, gaps):
     for x, (name, look) in zip(places, looks.items()):
         cell = here.sel(definition=name)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
-        beyond = np.broadcast_to(cell.beyond.values, error.shape)
+        beyond = np.broadcast_to(cell.get("reference_applies", 1) == 0, error.shape)
         known, drawn = np.isfinite(error), (flags != 0) | gaps
         panel.plot(x[drawn], error[drawn], label=name, **look)
         doubtful, lost = known & ((flags > 1) | beyond), {}
@@ -237,7 +222,8 @@ def plot_sweep(
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
     whole = root
-    root = root[["status", "deformation_error", "beyond", "beam_length", "beam_height"]]
+    needed = ("status", "deformation_error", "reference_applies", "beam_length", "beam_height")
+    root = root[[name for name in needed if name in root]]
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = _looks(root)
     several = [name for name in beams if _most((root.status != 0).sel(beam=[name]), parameter) > 1]

@@ -19,6 +19,9 @@ MOST_NETWORKS = 6
 FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
 """Definitions that are drawn before others."""
 
+REFERENCE = "reference to expected"
+"""Column of the errors of references."""
+
 FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
 """Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""
 
@@ -105,11 +108,7 @@ def described(cut, name):
     """What a quantity is, in words."""
     one = cut.sel(quantity=name)
     kind, component, of = (str(one[f"quantity_{part}"].item()) for part in ("kind", "component", "of"))
-    if kind == "area":
-        return "growth of the area"
-    if kind == "energy":
-        return "strain energy"
-    return f"{kind} {component}, {of}"
+    return {"area": "growth of the area", "energy": "strain energy"}.get(kind, f"{kind} {component}, {of}")
 
 
 def _points(cut, name, definition):
@@ -167,9 +166,7 @@ def _why(cut):
     """Why there is no error."""
     states = drawing.in_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
-    if message:
-        return f"No error: {states}. {message[:160]}"
-    return f"No error: {states}; there is neither a reference nor an expected value."
+    return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"
 
 
 # -- all quantities ----------------------------------------------------------------------------------------------------
@@ -206,36 +203,30 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     """
     whole = group(data, "shapes")
     rows = _rows(whole, material, kinematics)
-    names = [name for name in whole.definition.values.tolist() if any(name in row["asked"] for row in rows)]
-    errors = np.array([[row["errors"].get(name, np.nan) for name in names] for row in rows])
-    texts = [[drawing.error_text(row["errors"][name], "") if name in row["errors"] else drawing.NO_RESULT
-              if name in row["asked"] else drawing.NOT_ASKED for name in names] for row in rows]  # fmt: skip
-    heads = list(map(no_mathematics, names))
-    references = np.array([row["reference"] for row in rows])
-    if np.isfinite(references).any():
-        heads.append("reference to expected")
-        errors = np.column_stack([errors, references])
-        own = [drawing.error_text(one, "") if np.isfinite(one) else "" for one in references]
-        texts = [[*row, one] for row, one in zip(texts, own)]
+    names = [
+        name for name in (*whole.definition.values.tolist(), REFERENCE) if any(name in row for row in rows.values())
+    ]
+    errors = np.array([[row.get(name, np.nan) for name in names] for row in rows.values()]).reshape(len(rows), -1)
+    texts = [[drawing.NOT_ASKED if name not in row else
+              drawing.error_text(row[name], "") if np.isfinite(row[name]) else drawing.NO_RESULT
+              for name in names] for row in rows.values()]  # fmt: skip
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
     if not np.isfinite(errors).any():
         labels.say(panel, "No quantity has an error: see status and message.")
         return panel
     drawing.heat_map(panel, errors, np.array(texts, dtype=object))
-    panel.set_yticks(range(len(rows)), [no_mathematics(row["name"]) for row in rows])
-    panel.set_xticks(range(len(heads)), heads, rotation=90)
+    panel.set_yticks(range(len(rows)), list(map(no_mathematics, rows)))
+    panel.set_xticks(range(len(names)), list(map(no_mathematics, names)), rotation=90)
     panel.tick_params(length=0)
     said = {drawing.NO_RESULT: "no result that counts", drawing.NOT_ASKED: "not asked for"}
-    shown = {text for row in texts for text in row}
-    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if mark in shown))
+    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if any(mark in row for row in texts)))
     return panel
 
 
 def _rows(whole, material, kinematics):
-    """Quantities with the errors of definitions on the finest mesh that has one [%]."""
-    found = []
-    asked = whole.status != 0
+    """Errors on the finest mesh by quantity [%]: of definitions, NaN without a result, and of the reference."""
+    found, asked = {}, whole.status != 0
     for place in cells(asked, ("shape", "load")):
         try:
             cut, _ = _cut(whole, *place.values(), material, kinematics)
@@ -243,16 +234,15 @@ def _rows(whole, material, kinematics):
             continue
         several = len(labels_of(asked.sel(shape=place["shape"]), "load")) > 1
         where = " ".join(place.values()) if several else place["shape"]
-        definitions = labels_of(cut.status != 0, "definition")
+        finest = np.nanmax(cut.particles.values, initial=0.0)
         for name in _quantities(cut):
-            errors, finest = {}, np.nanmax(cut.particles.values, initial=0.0)
-            for definition in definitions:
+            row = found[f"{where}: {name}"] = {}
+            for definition in labels_of(cut.status != 0, "definition"):
                 particles, _, sizes, counted = _points(cut, name, definition)
-                if len(sizes) and counted[-1] and particles[-1] == finest:
-                    errors[definition] = sizes[-1]
+                there = len(sizes) and counted[-1] and particles[-1] == finest
+                row[definition] = sizes[-1] if there else np.nan
             reference = 100 * abs(float(cut.reference_expected_error.sel(quantity=name)))
-            row = {"name": f"{where}: {name}", "errors": errors, "asked": definitions}
-            found.append(row | {"reference": reference or np.nan})
+            row |= {REFERENCE: reference} if reference > 0 else {}
     return found
 
 
@@ -309,39 +299,30 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    width, height = drawing.extent(
-        np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")]), (1.0, 1.0)
-    )
-    columns = len(wanted) if isinstance(ax, np.ndarray) else min(NETWORK_COLUMNS, len(wanted))
-    page = style.COLUMN if columns == 1 else style.PAGE
-    tall = float(np.clip((page - 0.5 - 0.25 * columns) / columns * height / width * 1.12, 0.8, 3.2))
-    rows = -(-len(wanted) // columns)
-    figure, axes = style.panels(ax, rows, columns, figsize=(page, 1.2 + (tall + 0.35) * rows))
-    flat = axes.ravel()[: len(wanted)]
-    for panel in axes.ravel()[len(wanted) :]:
-        panel.remove()
+    places = np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")])
+    width, height = drawing.extent(places, (1.0, 1.0))
+    columns = min(NETWORK_COLUMNS, len(wanted))
+    wide = (style.COLUMN if columns == 1 else style.PAGE) / columns - 0.5
+    tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
     networks = case.reindex(definition=wanted)
-    scale = drawing.magnification(networks)
+    scale, most = drawing.magnification(networks), _largest_force(networks)
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
     said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
     there = np.isfinite(case.reference_displacement_x.values).any()
     below = "grey: outline of the reference, displaced; dashed: at rest" if there else "no reference"
-    labels.entitle(figure, ", ".join(said), below)
-    most = _largest_force(networks)
-    drawn = [_network(panel, networks.sel(definition=name), cut.sel(definition=name), scale, most)
-             for panel, name in zip(flat, wanted)]  # fmt: skip
-    for number, panel in enumerate(flat):
-        panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="" if number % columns else "y [mm]")
-        panel.set_title(panel.get_title("left") or wanted[number])
-        panel.grid(False)
-    lines = next((one for one in drawn if one is not None), None)
-    if figure is not None and lines is not None:
-        bar = figure.colorbar(lines, ax=flat.tolist(), location="bottom", extend="both", aspect=50, fraction=0.06)
-        bar.set_label("Spring force [N], tension positive", fontsize=style.SMALL)
+    shown = {name: (networks.sel(definition=name), cut.sel(definition=name)) for name in wanted}
+
+    def draw(panel, part):
+        return _network(panel, *part, scale, most), ""
+
+    flat = labels.small_multiples(ax, shown, NETWORK_COLUMNS, tall, ", ".join(said), draw, said=below)
+    lines = [one for panel in flat for one in panel.collections]
+    if lines and flat[0].figure.get_layout_engine():
+        bar = flat[0].figure.colorbar(lines[0], ax=flat.tolist(), location="bottom", extend="both", aspect=50,
+                                      fraction=0.06, label="Spring force [N], tension positive")  # fmt: skip
         bar.formatter.set_powerlimits((-2, 4))  # long numbers would run into each other
-        bar.update_ticks()
         bar.outline.set_linewidth(0.5)
     return flat
 
@@ -355,18 +336,17 @@ def _few(cut, asked):
 
 def _largest_force(networks):
     """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
-    forces = networks.spring_force.values
-    forces = np.abs(forces[np.isfinite(forces)])
-    return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
+    forces = np.abs(networks.spring_force.values)
+    return float(np.nanquantile(forces, 0.97)) if np.nanmax(forces, initial=0.0) > 0 else 1.0
 
 
 def _network(panel, one, state, scale, most):
-    """Draw one network; return its lines, or None."""
+    """Draw one network; return notes."""
     lines = drawing.draw_network(panel, one, scale, most, FORCES)
-    if lines is not None and not np.abs(lines.get_array()).max() > 0:
-        panel.set_title(f"{one.definition.item()}: forces in an energy")
-    flag = int(state.status)
-    if flag != STATUS.index("solved"):
-        text = f"{drawing.in_words(flag)}: {str(state.message.item())[:120]}" if lines is None else STATUS[flag]
-        labels.say(panel, text, bare=False)
-    return lines
+    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
+    panel.grid(False)
+    notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []
+    if STATUS[int(state.status)] != "solved":
+        message = f": {state.message.item()[:120]}" if lines is None else ""
+        notes.append(drawing.in_words(int(state.status)) + message)
+    return notes
