@@ -40,7 +40,6 @@ _NAMES = {
     "studies.output.summing_up": ("info",),
     "prediction.choices": ("Choice", "predict"),
     "prediction.search": ("MeshChoice", "MeshSearch", "SolvedMesh", "find_mesh"),
-    "problem.decay": ("Decay", "fit_decay"),
     "problem.geometry": ("Beam",),
     "problem.loads": ("LOADS",),
     "problem.materials": ("AnisotropicMaterial", "Material", "Rubber"),

@@ -23,8 +23,6 @@ from .prediction.search import MeshChoice as MeshChoice
 from .prediction.search import MeshSearch as MeshSearch
 from .prediction.search import SolvedMesh as SolvedMesh
 from .prediction.search import find_mesh as find_mesh
-from .problem.decay import Decay as Decay
-from .problem.decay import fit_decay as fit_decay
 from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS
 from .problem.materials import AnisotropicMaterial as AnisotropicMaterial

@@ -137,27 +137,6 @@ def test_a_reference_at_finite_strain_takes_the_plane_of_its_material(force):
         assert ours.displacement == pytest.approx(small.displacement, rel=1e-3)
 
 
-def test_an_orthotropic_sheet_in_plane_strain_is_the_block_without_strain_across():
-    moduli, ratios, shear = (140e9, 10e9, 9e9), {"xy": 0.3, "xz": 0.28, "yz": 0.4}, 5e9
-    compliance = np.diag([*(1 / one for one in moduli), 1 / shear])
-    for (i, j), name in zip(((0, 1), (0, 2), (1, 2)), ratios):
-        compliance[i, j] = compliance[j, i] = -ratios[name] / moduli[i]
-    block = np.linalg.inv(compliance)[np.ix_([0, 1, 3], [0, 1, 3])]
-    third = (moduli[2], ratios["xz"], ratios["yz"])
-    ply = st.AnisotropicMaterial.orthotropic(*moduli[:2], ratios["xy"], shear, across_the_plane=third)
-    np.testing.assert_allclose(ply.plane_stress, block, rtol=1e-9)
-    steel = st.AnisotropicMaterial.orthotropic(210e9, 210e9, 0.3, 210e9 / 2.6, across_the_plane=(210e9, 0.3, 0.3))
-    np.testing.assert_allclose(steel.plane_stress, by_lame(STEEL), rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("third", "said"), [((9e9, 0.3), "give E_z, nu_xz and nu_yz"), ((140e9, 0.3, 0.9), "some strain takes no work")]
-)
-def test_wrong_constants_across_the_plane_are_refused(third, said):
-    with pytest.raises(ValueError, match=f"across_the_plane.*{said}"):
-        st.AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", across_the_plane=third)
-
-
 def test_coupled_triangles_have_saint_venants_energy_in_three_dimensions():
     """Of Green's strain without a part across the plane: lambda/2 (tr G)^2 + mu G : G, at any strain."""
     mesh, clay = st.make_mesh(st.Beam(0.1, 0.02), "free", "5 mm"), st.Material(2e6, 0.45, plane="strain")

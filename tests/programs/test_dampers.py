@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import springtune as st
+from swings import fit_swing
 
 BEAM, RUBBER = st.Beam("100 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1100 kg/m^3")
 
@@ -25,7 +26,7 @@ def swing(one, session, setting, periods):
         moved = session.displacements() - place
         seen.append((frame * setting.dt, (motion.mass * shape) @ motion.network.reduce(moved)))
         session.advance(1)
-    return st.fit_decay(*np.array(seen).T)
+    return fit_swing(*np.array(seen).T)
 
 
 def started(one, name, setting):

@@ -1,4 +1,4 @@
-"""Measured decays: dampers that give them, verified by released beams, and fits of measured swings."""
+"""Measured decays: dampers that give them, verified by released beams."""
 
 import re
 from functools import cache
@@ -10,8 +10,7 @@ import pytest
 from scipy.linalg import eigh
 
 import springtune as st
-
-from tables import refused_files
+from swings import fit_swing
 
 BEAM, RUBBER = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
 DECREMENT = 0.3
@@ -49,7 +48,7 @@ def swing(one, integrator, step, periods=3, **options):
     motion.run(
         integrator, step, steps, bent(one), sample=1, watch=lambda time, u, v: seen.append((time, share(one, u)))
     )
-    return st.fit_decay(*np.array(seen).T)
+    return fit_swing(*np.array(seen).T)
 
 
 def damped(one, decrement=DECREMENT, step=0.0):
@@ -160,7 +159,7 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
         moved[free] = data.qpos
         seen.append((data.time, share(one, moved)))
         mujoco.mj_step(model, data, 20)
-    found = st.fit_decay(*np.array(seen).T)
+    found = fit_swing(*np.array(seen).T)
     assert found.period == pytest.approx(damping.period, rel=1e-3)
     assert found.decrement == pytest.approx(decrement, rel=2e-3)
 
@@ -176,83 +175,6 @@ def test_an_implicit_engine_is_given_what_its_steps_lack(name):
     for number in range(300):
         seen.append((number * setting.step, share(one, session.displacements() - place)))
         session.advance(1)
-    found = st.fit_decay(*np.array(seen).T)
+    found = fit_swing(*np.array(seen).T)
     assert found.period == pytest.approx(damping.period, rel=1e-3)
     assert found.decrement == pytest.approx(DECREMENT, rel=2e-3)
-
-
-# -- fits --------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
-@pytest.mark.parametrize("decrement", [0.01, 0.3, 3.0])
-def test_a_fit_finds_what_made_the_points(decrement, size):
-    times = np.linspace(2.0, 3.0, 150)
-    moved = size * (5 + np.exp(-decrement * (times - 2) / 0.2) * np.cos(2 * np.pi * times / 0.2 + 1))
-    found = st.fit_decay(times, moved)
-    assert (found.period, found.decrement) == pytest.approx((0.2, decrement), rel=1e-5)
-
-
-@pytest.mark.parametrize("points", [1.4, 1.5, 1.9, 2.1, 2.5, 3.0, 3.9, 4.1, 5.0, 10.0])
-@pytest.mark.parametrize("period", [1e-3, 1.0, 60.0])
-def test_a_fit_of_few_points_a_period_is_refused(points, period):
-    times = np.arange(80) * period / points
-    moved = np.exp(-0.1 * times / period) * np.cos(2 * np.pi * times / period)
-    if points < 4:
-        with pytest.raises(
-            ValueError, match="points a period of .* a faster swing would give.* take 4 points a period"
-        ):
-            st.fit_decay(times, moved)
-    else:
-        assert st.fit_decay(times, moved).period == pytest.approx(period, rel=1e-6)
-
-
-def test_errors_of_a_fit_are_those_of_noise():
-    """Over many noises the spread is the standard error, and the mean is right."""
-    rng, times = np.random.default_rng(3), np.sort(np.random.default_rng(4).uniform(0, 1, 80))
-    clean = np.exp(-1.5 * times) * np.cos(30 * times)
-    found = [st.fit_decay(times, clean + rng.normal(0, 0.05, 80)) for _ in range(60)]
-    for name, exact in (("period", 2 * np.pi / 30), ("decrement", np.pi / 10)):
-        values = np.array([getattr(one, name) for one in found])
-        told = np.mean([getattr(one, f"{name}_error") for one in found])
-        assert values.std() == pytest.approx(told, rel=0.3)
-        assert abs(values.mean() - exact) < 4 * told / np.sqrt(60)
-
-
-def test_a_swing_is_read_from_a_file(tmp_path):
-    times = np.linspace(0, 1, 100)
-    moved = 3 * np.exp(-times) * np.cos(20 * times)
-    path = tmp_path / "swing.csv"
-    rows = "".join(f"{1e3 * t},{x}\n" for t, x in zip(times, moved))
-    path.write_text("# let go at 0\ntime [ms],displacement [mm]\n" + rows)
-    found, exact = st.fit_decay(path), st.fit_decay(times, moved)
-    assert (found.period, found.decrement) == pytest.approx((exact.period, exact.decrement), rel=1e-6)
-
-
-@pytest.mark.parametrize(("text", "says"), refused_files("decay"))
-def test_files_that_are_no_swing_are_refused(text, says, tmp_path):
-    path = tmp_path / "swing.csv"
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(ValueError, match=says):
-        st.fit_decay(path)
-
-
-TIMES = np.linspace(0, 1, 50)
-
-
-@pytest.mark.parametrize(
-    "times, moved, says",
-    [
-        (TIMES, TIMES[:-1], "times: have shape"),
-        (TIMES[::-1], np.cos(20 * TIMES), "times: are not ascending"),
-        (TIMES, np.where(TIMES > 0.5, np.nan, TIMES), "no finite number"),
-        (TIMES, 0 * TIMES + 2, "no swing that decays"),
-        (TIMES, np.exp(TIMES) * np.cos(20 * TIMES), "no swing that decays"),
-        (TIMES, np.exp(-5 * TIMES), "no swing that decays"),
-        (TIMES, np.random.default_rng(0).normal(size=50), "no swing that decays"),
-    ],
-)
-def test_points_that_are_no_swing_are_refused(times, moved, says):
-    with pytest.raises(ValueError, match=says):
-        st.fit_decay(times, moved)

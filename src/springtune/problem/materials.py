@@ -356,7 +356,6 @@ class AnisotropicMaterial:
         angle: Number = 0.0,
         density: Number | None = None,
         name: str = "material",
-        across_the_plane: tuple[Number, float, float] | None = None,
     ) -> AnisotropicMaterial:
         """Make a material with two axes, such as a ply of fibres, from engineering constants.
 
@@ -373,10 +372,6 @@ class AnisotropicMaterial:
         density : float, str or None
             [kg/m3]
         name : str
-        across_the_plane : tuple of (float or str, float, float), optional
-            For plane strain: Young's modulus E_z [Pa] and the ratios nu_xz and nu_yz, contractions along z when pulled
-            along x and along y. The constants are then those of a sheet that cannot expand along z; of plane stress
-            without.
 
         Returns
         -------
@@ -385,12 +380,7 @@ class AnisotropicMaterial:
         Raises
         ------
         ValueError
-            If a quantity is not above zero or has the wrong unit, the size of Poisson's ratio exceeds sqrt(E_x / E_y),
-            or the constants across the plane do not fit the others.
-
-        Notes
-        -----
-        Plane strain has the compliance :math:`S_{ij} - S_{i3} S_{j3} / S_{33}` of the one in three dimensions.
+            If a quantity is not above zero or has the wrong unit, or Poisson's ratio exceeds sqrt(E_x / E_y) in size.
 
         Examples
         --------
@@ -413,8 +403,6 @@ class AnisotropicMaterial:
             root = f"sqrt(young_modulus_x / young_modulus_y) = {bound:.6g}"
             raise ValueError(f"{given} {root}; give the ratio for a pull along the fibres")
         nu = float(poisson_ratio_xy)
-        if across_the_plane is not None:
-            along, across, nu = _strained(along, across, nu, across_the_plane, name)
         scale = 1 - nu * nu * across / along
         made = cls(along / scale, across / scale, nu * across / scale, shear, density=density, name=name)
         return made.rotated(turn) if turn else made
@@ -619,23 +607,6 @@ class EngineeringConstants(NamedTuple):
     poisson_ratio_xy: float
     shear_modulus: float
     shear_by_x: float
-
-
-def _strained(
-    along: float, across: float, nu: float, third: tuple[Number, float, float], name: str
-) -> tuple[float, float, float]:
-    """Return moduli along x and y [Pa] and the ratio xy in plane strain, given E_z [Pa], nu_xz and nu_yz."""
-    try:
-        modulus, by_x, by_y = positive(third[0], "stress", "across_the_plane"), float(third[1]), float(third[2])
-    except (TypeError, IndexError):
-        expected = "give E_z, nu_xz and nu_yz, such as ('10 GPa', 0.3, 0.4)"
-        raise ValueError(f"across_the_plane: {third!r}; {expected}") from None
-    left_x, left_y = 1 - by_x**2 * modulus / along, 1 - by_y**2 * modulus / across
-    coupled = nu / along + by_x * by_y * modulus / (along * across)
-    if not (left_x > 0 and left_y > 0 and coupled**2 * along * across < left_x * left_y):
-        why = f"across_the_plane is {third!r}: some strain takes no work"
-        raise ValueError(f"material {name!r}: {why}; give smaller ratios")
-    return along / left_x, across / left_y, coupled * along / left_x
 
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
