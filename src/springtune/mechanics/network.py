@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_array
 
-from ..linalg import SOLVERS
 from ..linalg.blocks import Blocks
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
 from ..mesh.cells import Mesh
@@ -124,8 +123,6 @@ class Network:
         like: "Network | None" = None,
         solver: str | None = None,
     ) -> None:
-        if solver not in (None, *SOLVERS):
-            raise ValueError(f"unknown solver '{solver}'; known: {', '.join(SOLVERS)}")
         self.solver = solver
         self.mesh = mesh
         self.held = held

@@ -102,8 +102,6 @@ class Mesh:
             raise MeshError(f"points: {len(lost)} are nowhere, the first one {lost[0]}; give finite coordinates in m")
         if not self.cells:
             raise MeshError("there are no cells; give triangles, quads or both")
-        if len(self.bonds) and not (0 <= self.bonds.min() and self.bonds.max() < len(points)):
-            raise MeshError(f"bonds: they join points up to {self.bonds.max()} of {len(points)}; renumber them")
         for count, corners in self.cells.items():
             if corners.min() < 0 or corners.max() >= len(points):
                 cell = np.argmax(((corners < 0) | (corners >= len(points))).any(axis=1))

@@ -67,8 +67,6 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
 
     Sides become lines and points vertices. `springtune.read_shape` reads them.
     """
-    if not isinstance(mesh, Mesh | GroupedMesh):
-        raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
     if Path(path).suffix != ".vtu":
         raise MeshError(f"{path}: is not to end in '{Path(path).suffix}'; give a name that ends in .vtu")
     check_folder(path)

@@ -326,8 +326,6 @@ def bonded(mesh: Mesh, reach: float) -> Mesh:
     """
     from scipy.spatial import cKDTree  # here, since studies are read without scipy
 
-    if not reach > 0:
-        raise MeshError(f"reach: {reach!r} is not above zero; give a length in m")
     pairs = cKDTree(mesh.points).query_pairs(reach * (1 + 1e-9), output_type="ndarray")
     known = mesh.edges @ [len(mesh.points), 1]
     pairs = np.sort(pairs, axis=1)

@@ -53,7 +53,7 @@ class Beam:
     Raises
     ------
     ValueError
-        If a length is not above zero, a text not a length, or the name not a text.
+        If a length is not above zero, or a text not a length.
 
     Warns
     -----
@@ -76,8 +76,6 @@ class Beam:
     def __post_init__(self) -> None:
         for side in ("length", "height", "thickness"):
             put(self, **{side: positive(getattr(self, side), "length", side)})
-        if not isinstance(self.name, str):
-            raise ValueError(f"name: {self.name!r} is not a text; give one such as '200x40', or none")
         if not self.name:
             put(self, name=f"{1e3 * self.length:g}x{1e3 * self.height:g}")
         warn_of_size((self.length, self.height), f"beam {self.name!r}")

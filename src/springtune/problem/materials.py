@@ -60,7 +60,7 @@ class Material:
     Raises
     ------
     ValueError
-        If a quantity is not above zero or has the wrong unit, the name is not a text, the plane is unknown, or
+        If a quantity is not above zero or has the wrong unit, the plane is unknown, or
         Poisson's ratio is out of range.
 
     Examples
@@ -78,7 +78,7 @@ class Material:
     isotropic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_label(self)
+        _read_density(self)
         if self.plane not in PLANES:
             raise ValueError(f"plane: {self.plane!r} is unknown; give {' or '.join(map(repr, PLANES))}")
         put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
@@ -338,7 +338,7 @@ class AnisotropicMaterial:
     isotropic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        _check_label(self)
+        _read_density(self)
         for constant in CONSTANTS:
             read = positive if constant in ("C11", "C22", "C66") else quantity
             put(self, **{constant: read(getattr(self, constant), "stress", constant)})
@@ -693,9 +693,7 @@ def _known_test(test: str) -> str:
     return test
 
 
-def _check_label(material: AnyMaterial) -> None:
-    """Refuse a name that is not a text; read the density."""
-    if not isinstance(material.name, str):
-        raise ValueError(f"name: {material.name!r} is not a text; give one such as 'steel', or none")
+def _read_density(material: AnyMaterial) -> None:
+    """Read the density of a material in SI units."""
     if material.density is not None:
         put(material, density=positive(material.density, "density", "density"))

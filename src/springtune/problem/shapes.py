@@ -395,8 +395,6 @@ class Quantity:
             if kind is None and isinstance(self.expected, str):
                 raise ValueError(f"{what}, expected: {self.expected!r}; give a number in SI units")
             put(self, expected=quantity(self.expected, kind or "length", f"{what}, expected"))
-        if not isinstance(self.source, str):
-            raise ValueError(f"{what}, source: {self.source!r} is not a text; give one")
 
 
 @dataclass(frozen=True)
@@ -588,8 +586,7 @@ class Shape:
             _all_of([load], LoadCase, f"{what}, loads")
             if name != load.name:
                 raise ValueError(f"{what}, loads: {name!r} has a load that is named {load.name!r}; give both one name")
-        if not isinstance(self.file, str):
-            raise ValueError(f"{what}, file: {self.file!r} is not a text; give the path of a mesh file")
+        put(self, file=str(self.file))
         if bool(self.outline) == bool(self.file):
             both = "both an outline and a file" if self.file else "neither an outline nor a file"
             raise ValueError(f"{what}: has {both}; give one of them")
