@@ -261,6 +261,9 @@ class Problem:
         """Check materials, groups and quantities on the mesh, and find its corners."""
         load = self.load
         present = [self.mesh.names[part] for part in np.unique(self.mesh.parts)]
+        if missing := [name for name in present if name not in materials]:
+            lacking, given = (", ".join(map(repr, names)) for names in (missing, materials))
+            raise ValueError(f"parts without a material: {lacking}; there are materials of {given}")
         absent = np.zeros((3, 3))
         planes = {name: one.in_plane.plane_stress for name, one in materials.items()}
         self.stiffness = np.array([planes[n] if n in present else absent for n in self.mesh.names])
