@@ -32,7 +32,7 @@ def write(tree: xr.DataTree, folder: Path) -> list[Path]:
     solved = solved.transpose(*MESH, *(name for name in solved.dims if name not in MESH))
     units = {name: str(fields[name].attrs.get("units", "1")) for name in solved.dims}
     for place in np.argwhere(solved.values):
-        labels = {str(name): solved[name].values[at].item() for name, at in zip(solved.dims, place)}
+        labels = {str(name): solved[name][at].item() for name, at in zip(solved.dims, place)}
         name = cell_text(labels, units).replace(", ", "_").replace(" ", "") + ".vtu"
         _write(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", "")} | labels)
         rows.append({"file": name} | labels)
