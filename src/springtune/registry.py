@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 HOOKS = {"drawing": "studies.output.drawing", "files": "handover.formats", "writing": "handover.written"}
-"""Modules that others call by name, mostly those of upper layers, so that no result depends on them."""
+"""Modules that others call by name, mostly those of upper rooms: grimp counts an import inside a function, so that the
+import linter would find circles, and a new figure would change the keys of results."""
 
 
 PLUGINS_VARIABLE = "SPRINGTUNE_PLUGINS"

@@ -6,13 +6,12 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-from springtune.mesh.types import MESH_TYPES, MOST_MESHED
+from springtune.mesh.types import MESH_TYPES, too_many
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE
 from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from springtune.problem.quantities import nearest
 from springtune.springs.base import DEFINITIONS
-from springtune.springs.lattice import COEFFICIENT
 
 from .combinations import SAME_VALUE, factors
 from .messages import Key, Problems, part_of, show
@@ -187,30 +186,24 @@ def in_mm(length: float) -> str:
 
 
 def check_particles(
-    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float, shown: str = ""
+    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
 ) -> None:
-    """Refuse mesh sizes that give too many particles."""
+    """Refuse mesh sizes that give too many particles in a box."""
     size = min(sizes)
-    particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
-    if particles > MOST_MESHED:
-        least = 1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED)
-        problems.add(path, f"{shown or in_mm(size)} gives {particles:.0e} particles; give {least:.2g} mm or more")
+    count = MESH_TYPES["structured"].particles(length, height, size)
+    if why := too_many(count, size, min(length, height), f"box of '{path[0]}'"):
+        problems.add(path, f"{in_mm(size)} {why}")
 
 
 def check_meshes(config: StudyConfig, grids: Iterable[Grid], problems: Problems) -> None:
     """Check mesh sizes against the size of their beams."""
     for grid in grids:
         for mesh in dict.fromkeys(scene.mesh for scene in grid.scenes if scene.mesh.file is None):
-            size, beam = mesh.mesh_size, config.beams[mesh.beam.name]
-            number = config.grids[grid.name].mesh_size.index(size)
-            path, written = part_of(problems.content, ("grids", grid.name, "mesh_size", number))
-            shown = show(written) if isinstance(written, str) else in_mm(size)
-            side = min(beam.length, beam.height)
-            if size > side:
-                most = f"give at most its smaller side, {in_mm(side)}"
-                problems.add(path, f"{shown} is larger than beam '{mesh.beam.name}'; {most}")
-            where = f"{shown} on beam '{mesh.beam.name}'"
-            check_particles(problems, path, [size], beam.length, beam.height, where)
+            size, beam = mesh.mesh_size, mesh.beam
+            if why := MESH_TYPES[mesh.mesh_type].refusal(beam.length, beam.height, size, f"beam '{beam.name}'"):
+                number = config.grids[grid.name].mesh_size.index(size)
+                path, written = part_of(problems.content, ("grids", grid.name, "mesh_size", number))
+                problems.add(path, f"{show(written) if isinstance(written, str) else in_mm(size)} {why}")
 
 
 # -- definitions -------------------------------------------------------------------------------------------------------

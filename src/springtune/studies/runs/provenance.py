@@ -20,19 +20,8 @@ from ..config.model import Study
 from .keys import installed
 from .source import COMMIT_FILE, PACKAGE, checksum, clone
 
-SOFTWARE = (
-    "cvxopt",
-    "h5netcdf",
-    "h5py",
-    "meshio",
-    "netgen-mesher",
-    "numba",
-    "numpy",
-    "scikit-fem",
-    "scipy",
-    "snakemake",
-    "xarray",
-)
+SOFTWARE = ("cvxopt h5netcdf h5py meshio netgen-mesher numba numpy pyamg scikit-fem scipy snakemake xarray").split()
+"""Distributions whose versions a dataset holds."""
 
 CHANGED = "+changes"
 """Ending of `git_commit` if files differ from the commit."""
