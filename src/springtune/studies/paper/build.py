@@ -150,7 +150,7 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
 
 
 class Panel(BaseModel):
-    """A panel; `plot` is a public plot function such as ``plot_sensitivity``, or of `SKETCHES`."""
+    """A panel; `plot` is a public plot function such as ``plot_sensitivity``."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -234,11 +234,9 @@ def _drawn(script: Path, name: str) -> Any:
 def _plot(plot: str, name: str) -> Callable[..., object]:
     import springtune
 
-    if plot in SKETCHES:
-        return SKETCHES[plot]
     if not plot.startswith("plot_") or plot not in springtune.__all__:
         known = [one for one in springtune.__all__ if one.startswith("plot_")]
-        raise PaperError(f"{name}: nothing plots '{plot}'; give one of {', '.join([*SKETCHES, *known])}")
+        raise PaperError(f"{name}: nothing plots '{plot}'; give one of {', '.join(known)}")
     return getattr(springtune, plot)
 
 
@@ -251,53 +249,6 @@ def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str
         place = ": ".join(filter(None, (panel.study, cell_text(panel.at, {"mesh_size": "m"}))))
         parts.append(f"{place}, sha256 {chosen(datasets, panel.study, name).sha256[:HASH_SHOWN]}")
     return "; ".join(dict.fromkeys(parts))
-
-
-# -- sketches of what is loaded and how --------------------------------------------------------------------------------
-
-
-def sketch_block(tree: Any, part: "SubFigure", *, beam: str) -> None:
-    """Draw a block, fixed below and pressed from above."""
-    root = tree.to_dataset().sel(beam=beam)
-    length, height = 1e3 * float(root.beam_length), 1e3 * float(root.beam_height)
-    panel = part.subplots()
-    panel.fill([0, length, length, 0], [0, 0, height, height], facecolor="0.88", edgecolor="0.3", linewidth=1.0)
-    panel.fill([0, length, length, 0], [0, 0, -0.12 * height, -0.12 * height], facecolor="none", edgecolor="0.3",
-               hatch="////", linewidth=0)  # fmt: skip
-    _draw_pressure(panel, 0, length, height, 1.45 * height)
-    panel.plot(length / 2, height, "o", color="#14213d", clip_on=False)
-    panel.text(length / 2, 0.8 * height, "displacement measured here", ha="center", va="top", fontsize=8)
-    panel.set(aspect="equal", xlim=(-0.05 * length, 1.05 * length), ylim=(-0.2 * height, 1.5 * height))
-    panel.set_title(f"{beam} mm, pressed on one long side")
-    panel.axis("off")
-
-
-def _draw_pressure(panel: Any, left: float, length: float, low: float, high: float) -> None:
-    """Draw arrows down onto a side."""
-    for x in np.linspace(left, left + length, 13):
-        panel.annotate("", (x, low), xytext=(x, high), arrowprops={"arrowstyle": "->", "color": "#b5382a"})
-
-
-def sketch_laying(tree: Any, part: "SubFigure") -> None:
-    """Draw a strip above the trapezoid that it is laid on."""
-    laid, root = tree["laying"].to_dataset(), tree.to_dataset()
-    x, y = 1e3 * laid.trapezoid_x.values, 1e3 * laid.trapezoid_y.values
-    length, height = 1e3 * float(root.beam_length.max()), 1e3 * float(root.beam_height.max())
-    panel = part.subplots()
-    panel.fill(x, y, facecolor="0.8", edgecolor="0.3", linewidth=1.0)
-    panel.plot([-0.56 * length, 0.56 * length], [0, 0], color="0.3", linewidth=1.2)
-    left, low = (x.min() + x.max() - length) / 2, y.max()
-    panel.fill([left, left + length, left + length, left], [low, low, low + height, low + height],
-               facecolor="#e09f3e", edgecolor="0.3", linewidth=1.0)  # fmt: skip
-    _draw_pressure(panel, left, length, low + height, low + 2.6 * height)
-    panel.text((x.min() + x.max()) / 2, y.mean(), "steel", ha="center", va="center", fontsize=8)
-    panel.text(left + length, low + 0.5 * height, "  rubber", ha="left", va="center", fontsize=8)
-    panel.set(aspect="equal", xlim=(-0.58 * length, 0.66 * length), ylim=(-1, low + 2.8 * height))
-    panel.set_title("A strip before it is laid")
-    panel.axis("off")
-
-
-SKETCHES: dict[str, Callable[..., object]] = {"sketch_block": sketch_block, "sketch_laying": sketch_laying}
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ of a study's dataset at some labels, reduced where that leaves several cells, or
 A table is the product of its rows and columns, each a part of such a declaration.
 """
 
-import ast
 import hashlib
 import json
 import math
@@ -23,6 +22,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 import yaml
+from jinja2 import StrictUndefined, TemplateError
+from jinja2.sandbox import SandboxedEnvironment
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from ..output import reading
@@ -355,35 +356,20 @@ def _marks(number: Number, cells: pd.DataFrame) -> str:
     return "".join(mark for name, mark in number.marks.items() if marked[name])
 
 
-ARITHMETIC = (
-    ast.Expression,
-    ast.Constant,
-    ast.Name,
-    ast.BinOp,
-    ast.UnaryOp,
-    ast.Call,
-    ast.Load,
-    ast.operator,
-    ast.USub,
-)
-KNOWN_FUNCTIONS = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
+FORMULAS = SandboxedEnvironment(undefined=StrictUndefined)
+FORMULAS.globals = {"abs": abs, "max": max, "min": min, "pi": math.pi, "sqrt": math.sqrt}
 
 
 def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
     """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
     known = {key: math.nan if one["value"] is None else one["value"] for key, one in found.items()}
-    names: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, **known, **KNOWN_FUNCTIONS}
     try:
-        tree = ast.parse(text, mode="eval")
-        for node in ast.walk(tree):
-            if not isinstance(node, ARITHMETIC) or isinstance(node, ast.Name) and node.id not in names:
-                raise PaperError(
-                    f"{name}: '{ast.unparse(node)}' of the formula is not known; give a number that is declared above, "
-                    f"+ - * / ** or {', '.join(KNOWN_FUNCTIONS)}"
-                )
-        return float(eval(compile(tree, name, "eval"), names))  # noqa: S307  # of these nodes and names alone
-    except (SyntaxError, ArithmeticError, TypeError, ValueError) as error:
-        raise PaperError(f"{name}: the formula '{text}' cannot be computed: {error}") from None
+        return float(FORMULAS.compile_expression(text, undefined_to_none=False)(**known))
+    except (TemplateError, ArithmeticError, TypeError, ValueError) as error:
+        raise PaperError(
+            f"{name}: the formula '{text}' cannot be computed: {error}; give numbers that are declared above, "
+            f"+ - * / ** and {', '.join(FORMULAS.globals)}"
+        ) from None
 
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
