@@ -27,7 +27,7 @@ _NAMES = {
         "plot_engine_maps",
     ),
     "studies.kinds.laying.figures": ("plot_laying",),
-    "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
+    "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_moduli"),
     "studies.kinds.samples.figures": ("plot_sobol",),
     "studies.kinds.bodies.beam_figures": ("plot_block", "plot_deformed", "plot_sensitivity"),
     "studies.kinds.bodies.errors": ("plot_size", "plot_sweep"),

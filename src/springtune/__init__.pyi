@@ -74,7 +74,6 @@ from .studies.kinds.engines.figures import plot_engine_errors as plot_engine_err
 from .studies.kinds.engines.figures import plot_engine_maps as plot_engine_maps
 from .studies.kinds.laying.figures import plot_laying as plot_laying
 from .studies.kinds.moduli.figures import plot_definitions_loads as plot_definitions_loads
-from .studies.kinds.moduli.figures import plot_definitions_size as plot_definitions_size
 from .studies.kinds.moduli.figures import plot_moduli as plot_moduli
 from .studies.kinds.samples.figures import plot_sobol as plot_sobol
 from .studies.kinds.stability.figures import plot_stability_maps as plot_stability_maps

@@ -46,7 +46,6 @@ EVERY_PLOT = {
     st.plot_deformed: (SCENES | {"definition": "area"}, 2),
     st.plot_block: ({"beam": "100x20", "mesh_type": "free", "mesh_size": 2e-3, "material": "steel"}, 2),
     st.plot_moduli: ({}, 2),
-    st.plot_definitions_size: ({"beam": "100x20", "material": "steel", "load": "traction", "kinematics": "linear"}, 2),
     st.plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
     st.plot_laying: ({}, (4, 3)),
     st.plot_engine_errors: ({"scene": "sheet"}, None),

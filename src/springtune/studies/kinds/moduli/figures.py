@@ -1,4 +1,4 @@
-"""Figures that compare definitions: moduli, errors over mesh sizes and by load."""
+"""Figures that compare definitions: moduli, and errors by load."""
 
 import numpy as np
 
@@ -8,50 +8,18 @@ from ...output import labels, style
 from ...output.dataset import most_requested
 from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labelled_beam, labels_of, sign_of_errors, unswept
-from .outputs import figures
-
-FLOOR = 1e-5
-"""Smallest error drawn on a logarithmic axis [1]; smaller ones are rounding and the reference's own error."""
-
-MOST_NAMED = 6
-"""Most named lines in a panel of errors against mesh size; the others are grey."""
-
-BASELINE = "uniform"
-"""The definition that is named beside the best ones."""
 
 
 def definitions(tree):
-    """Figures that compare definitions: moduli, errors against mesh size by load, and heat maps by mesh type."""
+    """Figures that compare definitions: moduli, and by mesh type errors of the beam and kinematics with most scenes."""
+    yield "definitions_moduli", plot_moduli, {}
     root = unswept(group(tree, "/"))
-    asked = root.status != 0
-    for stem, selection in figures(labels_of(asked, "load"), labels_of(asked, "mesh_type")).items():
-        if "load" in selection:
-            yield stem, plot_definitions_size, _main(root, ("beam", "kinematics", "material"), selection)
-        elif "mesh_type" in selection:
-            yield stem, plot_definitions_loads, _main(root, ("beam", "kinematics"), selection)
-        else:
-            yield stem, plot_moduli, {}
-
-
-def _main(root, names, selection):
-    """A selection, and of further dimensions the labels with most of its scenes."""
-    chosen, root = dict(selection), root[["status"]].sel({name: [label] for name, label in selection.items()})
-    for name in names:
-        chosen[name] = most_requested(root, name)
-        root = root.sel({name: [chosen[name]]})
-    return chosen
-
-
-def _by_mesh_type(ax, present, title, draw):
-    """A panel a mesh type; `draw` returns notes, and what to say without lines."""
-    names = {name: name for name in labels_of(present, "mesh_type")}
-    return labels.small_multiples(ax, names, 2, 1.95, title, draw)
-
-
-def _statuses(flags):
-    """Count the cells of each status, in words."""
-    found = labels.statuses(flags).items()
-    return ", ".join(f"{name} ({count})" for name, count in found) or "none was asked for"
+    for mesh_type in labels_of(root.status != 0, "mesh_type"):
+        selection, own = {"mesh_type": mesh_type}, root[["status"]].sel(mesh_type=[mesh_type])
+        for name in ("beam", "kinematics"):
+            selection[name] = most_requested(own, name)
+            own = own.sel({name: [selection[name]]})
+        yield f"definitions_loads_{mesh_type}", plot_definitions_loads, selection
 
 
 @style.styled
@@ -86,11 +54,12 @@ def plot_moduli(data, ax=None):
     """
     moduli = group(data, "moduli")
     title = "Effective Poisson's ratio against the one asked for; grey: as asked"
-    return _by_mesh_type(ax, moduli.status != 0, title, lambda panel, name: _moduli(panel, moduli.sel(mesh_type=name)))
+    shown = {name: moduli.sel(mesh_type=name) for name in labels_of(moduli.status != 0, "mesh_type")}
+    return labels.small_multiples(ax, shown, 2, 1.95, title, _moduli)
 
 
 def _moduli(panel, here):
-    """Draw the moduli of one mesh type, see `_by_mesh_type`."""
+    """Draw the moduli of one mesh type; return notes, and what to say without lines."""
     panel.set(xlabel="asked for", ylabel="effective")
     curves, lacking, wanted = {}, [], here.poisson_ratio.values
     for definition in here.definition.values:
@@ -109,94 +78,8 @@ def _moduli(panel, here):
     for number, names in enumerate(labels.alike(curves, 0.012)):
         panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
     said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
-    return said, f"No definition has moduli here: {_statuses(here.status.values)}."
-
-
-@style.styled
-def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None, kinematics=None):
-    """Field error against mesh size with fitted rates, a panel a mesh type, a line a definition.
-
-    Definitions that look like one line share it. Only the best and `uniform` have names; the others are grey.
-
-    Parameters
-    ----------
-    data : xarray.DataTree or xarray.Dataset
-        A study's dataset, or its root.
-    ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as mesh types; by default a new figure.
-    beam, material, load, kinematics : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
-
-    Returns
-    -------
-    ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
-        One a mesh type.
-
-    Raises
-    ------
-    ValueError
-        If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as mesh types.
-
-    Examples
-    --------
-    >>> import springtune as st  # tree = st.open("results/mine")
-    >>> axes = st.plot_definitions_size(tree, beam="200x40", material="steel", load="traction", kinematics="linear")
-    >>> [panel.get_title(loc="left") for panel in axes]
-    ['structured', 'free']
-    >>> axes[0].figure.get_suptitle()
-    '200x40 mm, steel, traction: error of the displacement field in L2, fitted rate in brackets'
-    """
-    root = unswept(group(data, "/"))
-    chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
-    root = root.sel(chosen)
-    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['material']}, {chosen['load']}"
-    rates = ", fitted rate in brackets" if len(labels_of(root.status != 0, "mesh_size")) > 1 else ""
-    title = f"{title}: error of the displacement field in L2{rates}"
-    values = root.field_error.values
-    values = 100 * np.maximum(values[np.isfinite(values)], FLOOR)
-    limits = (0.7 * values.min(), 1.4 * values.max()) if len(values) else None
-
-    def draw(panel, name):
-        drawn = _field_errors(panel, root.field_error.sel(mesh_type=name), root.status.sel(mesh_type=name))
-        panel.set(ylabel="Error [%]", ylim=limits)
-        style.plain(panel, "y")
-        return drawn
-
-    return _by_mesh_type(ax, root.status != 0, title, draw)
-
-
-def _field_errors(panel, error, status):
-    """Draw the errors of one mesh type, see `_by_mesh_type`: the best definitions and the baseline have names."""
-    asked = labels_of(status != 0, "mesh_size")
-    error = error.sel(mesh_size=asked)
-    every, flags = (one.transpose("definition", ...).values for one in (error, status.sel(mesh_size=asked)))
-    sizes, names = 1e3 * error.mesh_size.values, error.definition.values
-    known = np.isfinite(every)
-    curves = {str(name): 100 * np.maximum(row, FLOOR) for name, row, there in zip(names, every, known) if there.any()}
-    panel.set(yscale="log")
-    places = dict(zip(curves, labels.sizes_axis(panel, sizes, len(curves))))
-    if not curves:
-        return [], f"No definition has a field error here: {_statuses(flags)}."
-    together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
-    together.sort(key=lambda one: np.nanmean(np.log(curves[one[0]])))
-    base, named = next((one for one in together if BASELINE in one), None), together[:MOST_NAMED]
-    if base is not None and base not in named:
-        named[-1] = base
-    others = [name for one in together if one not in named for name in one]
-    for name in others:
-        panel.plot(places[name], curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
-    order = names.tolist()
-    for one in named:
-        values, look = curves[one[0]], style.line(order.index(one[0]))
-        there = np.flatnonzero(np.isfinite(values))
-        label = ", ".join(one)
-        if len(there) > 1:
-            rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
-            label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
-        panel.plot(places[one[0]], values, label=label, **look)
-    lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
-    said = {"grey": others, "no error": lacking}
-    return [f"{what}: {', '.join(own)}" for what, own in said.items() if own], ""
+    counts = ", ".join(f"{name} ({count})" for name, count in labels.statuses(here.status.values).items())
+    return said, f"No definition has moduli here: {counts or 'none was asked for'}."
 
 
 @style.styled

@@ -4,16 +4,9 @@ from ...config.kind import Output
 from ...output.browse import Plot, View
 
 
-def figures(loads, mesh_types):
-    """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type, of the scenes of beams."""
-    found = {"definitions_moduli": {}}
-    found |= {f"definitions_size_{load}": {"load": load} for load in loads}
-    return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
-
-
 def _figures(study):
-    loads = dict.fromkeys(scene.load for scene in study.scenes)
-    return figures(loads, dict.fromkeys(scene.mesh.mesh_type for scene in study.scenes))
+    mesh_types = dict.fromkeys(scene.mesh.mesh_type for scene in study.scenes)
+    return {"definitions_moduli": {}} | {f"definitions_loads_{name}": {"mesh_type": name} for name in mesh_types}
 
 
 def _lack(study):
