@@ -24,7 +24,6 @@ _NAMES = {
     "studies.kinds.engines.figures": (
         "plot_engine_curves",
         "plot_engine_errors",
-        "plot_engine_maps",
     ),
     "studies.kinds.laying.figures": ("plot_laying",),
     "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_moduli"),

@@ -71,7 +71,6 @@ from .studies.kinds.bodies.shape_figures import plot_shape_errors as plot_shape_
 from .studies.kinds.bodies.shape_figures import plot_shapes as plot_shapes
 from .studies.kinds.engines.figures import plot_engine_curves as plot_engine_curves
 from .studies.kinds.engines.figures import plot_engine_errors as plot_engine_errors
-from .studies.kinds.engines.figures import plot_engine_maps as plot_engine_maps
 from .studies.kinds.laying.figures import plot_laying as plot_laying
 from .studies.kinds.moduli.figures import plot_definitions_loads as plot_definitions_loads
 from .studies.kinds.moduli.figures import plot_moduli as plot_moduli

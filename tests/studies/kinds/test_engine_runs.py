@@ -265,7 +265,7 @@ def test_outputs_are_figures_of_each_scene_and_a_table(collected):
     campaign = Campaign("try.yaml")
     campaign.finish()
     drawn = {path.name for path in (campaign.folder / "figures").iterdir()}
-    assert drawn == {f"engines_{name}_pull.{ending}" for name in ("errors", "maps") for ending in ("png", "pdf")}
+    assert drawn == {f"engines_errors_pull.{ending}" for ending in ("png", "pdf")}
     with open(campaign.folder / "tables/engines.csv") as file:
         rows = list(csv.DictReader(file))
     assert [row["engine_status"] for row in rows] == ["absent"] * 2 + ["rest"] * 2

@@ -49,7 +49,6 @@ EVERY_PLOT = {
     st.plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
     st.plot_laying: ({}, (4, 3)),
     st.plot_engine_errors: ({"scene": "sheet"}, None),
-    st.plot_engine_maps: ({"scene": "sheet"}, 4),
     st.plot_engine_curves: ({"scene": "strip"}, 4),
     st.plot_shapes: ({}, None),
     st.plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),

@@ -7,7 +7,6 @@ from springtune.problem.status import Status
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from .outputs import figures
 
 SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
          "boundary-elements", "tensor-mass", "calculix-cps3", "calculix-cps8")  # fmt: skip
@@ -28,8 +27,8 @@ def named(data):
 
 def benchmark(tree):
     """Figures of the benchmark: errors over seconds of each scene."""
-    for stem, selection in figures(group(tree, "benchmark").scene.values.tolist()).items():
-        yield stem, plot_benchmark, selection
+    for scene in group(tree, "benchmark").scene.values.tolist():
+        yield f"benchmark_{scene}", plot_benchmark, {"scene": scene}
 
 
 @style.styled

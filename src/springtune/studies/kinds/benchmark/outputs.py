@@ -4,17 +4,11 @@ from ...config.kind import Output
 from ...output.browse import Plot, View
 from . import PARTS
 
-
-def figures(scenes):
-    """Figures of the benchmark, by stem."""
-    return {f"benchmark_{scene}": {"scene": scene} for scene in scenes}
-
-
 OUTPUTS = (
     Output(
         "benchmark",
         "run time against error",
-        figures=lambda study: figures(study.axes.get("scene", ())),
+        figures=lambda study: {f"benchmark_{scene}": {"scene": scene} for scene in study.parts["benchmark"]},
         plot="studies.kinds.benchmark.figures:benchmark",
         shows="a benchmark",
     ),

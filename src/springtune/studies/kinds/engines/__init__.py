@@ -5,6 +5,3 @@ SETTING = ("precision", "dt", "substeps", "iterations")
 
 RUN_ENDS = ("not_requested", "rest", "swings", "moving", "diverged", "absent", "refused", "failed", "inverted")
 """How a run ends, in order of the flags of `engine_status`."""
-
-WITHOUT_RUN = ("absent", "refused", "failed")
-"""Ends of runs in which nothing moved."""

@@ -1,30 +1,26 @@
-"""Figures of scenes in engines: error over the time of a frame, settings, and sensitivity curves."""
+"""Figures of scenes in engines: error over the time of a frame, and sensitivity curves."""
 
 import numpy as np
 
 from springtune.problem.compare import unbeaten
 
 from ...output import labels, style
-from ...output.drawing import NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labels_of
 from ...output.text import cell_text
-from . import RUN_ENDS, SETTING, WITHOUT_RUN
-from .outputs import figures
+from . import RUN_ENDS, SETTING
 
 FRAME = 1 / 60
 """Time of motion that costs are given for [s]."""
 
-END_SIGNS, NO_RUN = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}, "∅"
-"""On the map of settings: of runs that moved and have no error, and of those that did not begin or end."""
-
 
 def engines(tree):
     """Stem, function that plots, and selection of each figure."""
-    plots = {"errors": plot_engine_errors, "maps": plot_engine_maps, "curves": plot_engine_curves}
-    names = "engines", "engine_curves"
-    scenes = [labels_of(group(tree, name).status != 0, "scene") if name in tree else [] for name in names]
-    for stem, selection in figures(*scenes).items():
-        yield stem, plots[stem.split("_")[1]], selection
+    for name, stem, plot in (
+        ("engines", "errors", plot_engine_errors),
+        ("engine_curves", "curves", plot_engine_curves),
+    ):
+        for scene in labels_of(group(tree, name).status != 0, "scene") if name in tree else ():
+            yield f"engines_{stem}_{scene}", plot, {"scene": scene}
 
 
 def _runs(data, name, scene):
@@ -101,73 +97,6 @@ def plot_engine_errors(data, ax=None, *, scene=None):
         style.plain(panel, "x", "y")
     labels.finish(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
     return panel
-
-
-@style.styled
-def plot_engine_maps(data, ax=None, *, scene=None):
-    """How runs end and their errors, by step and iterations: a panel an engine.
-
-    Parameters
-    ----------
-    data : xarray.DataTree or xarray.Dataset
-        A study's dataset, or its group ``/engines``.
-    ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as panels; by default a new figure.
-    scene : str, optional
-        Scene; may be left out where there is one.
-
-    Returns
-    -------
-    ndarray of matplotlib.axes.Axes
-        One an engine that ran, with the definition where there are several.
-
-    Raises
-    ------
-    ValueError
-        As `plot_engine_errors`, or if ``ax`` has another number of Axes.
-
-    Examples
-    --------
-    >>> import springtune as st  # tree = st.open("results/mine")
-    >>> axes = st.plot_engine_maps(tree, scene="sheet")
-    >>> [panel.get_title(loc="left") for panel in axes]
-    ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
-    """
-    case, runs, lost = _runs(data, "engines", scene)
-    shown = {name: rows for name, rows in runs.items() if not rows.end.isin(WITHOUT_RUN).all()}
-    steps = ["precision", "step", "substeps", "dt"]
-    ends = {end for rows in shown.values() for end in rows.end[rows.error.isna()]}
-    said = [f"{sign} {end}" for end, sign in END_SIGNS.items() if end in ends]
-    said += [f"{NO_RUN} no run"] * bool(ends & {*WITHOUT_RUN})
-    title = f"{case.scene.item()}, rows: frame [ms] / substeps; error [%], × displacement over the reference's"
-    absent = ", ".join(name for name in runs if name not in shown)
-    title = ", ".join([title, *said]) + (f"; not run: {absent}" if absent else "")
-
-    def draw(panel, rows):
-        if not len(rows):
-            return [], f"Nothing was run: {lost}."
-        texts = [_text(end, 100 * error) for end, error in zip(rows.end, rows.error)]
-        rows = rows.assign(step=rows.dt / rows.substeps, text=texts)  # the smallest step first
-        errors, texts = (rows.pivot(index=steps, columns="iterations", values=name) for name in ("error", "text"))
-        heat_map(panel, 100 * errors.values, texts.fillna(NOT_ASKED).values)
-        several = rows.precision.nunique() > 1
-        panel.set_yticks(range(len(errors)), [
-            f"{one + ', ' if several else ''}{1e3 * dt:.3g} / {count}" for one, _, count, dt in errors.index
-        ])  # fmt: skip
-        panel.set_xticks(range(len(errors.columns)), errors.columns)
-        panel.set(xlabel="Iterations")
-        return [], ""
-
-    counts = [len(rows[[*SETTING[:3]]].drop_duplicates()) for rows in shown.values()]
-    return labels.small_multiples(ax, shown or {"": []}, 3, 0.8 + 0.19 * max([3, *counts]), title, draw)
-
-
-def _text(end, error):
-    """Error of a run at rest [%], or the sign of how it ended."""
-    if not np.isfinite(error):
-        return END_SIGNS.get(end, NO_RUN)
-    times = 1 + error / 100
-    return error_text(error) if error < 100 else f"×{times:.{1 if times < 9.95 else 0}f}"
 
 
 @style.styled

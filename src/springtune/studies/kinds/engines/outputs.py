@@ -4,21 +4,16 @@ from ...config.kind import Output
 from ...output.browse import Plot, View
 
 
-def figures(scenes, curves):
-    """Figures by stem: of scenes that were run, and of those with curves."""
-    shown = {"errors": scenes, "maps": scenes, "curves": curves}
-    return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
-
-
-def _scenes(runs):
-    return [[run.labels["scene"] for run in runs if run.of_curve is curves] for curves in (False, True)]
+def _figures(study):
+    shown = [("curves" if run.of_curve else "errors", run.labels["scene"]) for run in study.parts["engines"]]
+    return {f"engines_{name}_{scene}": {"scene": scene} for name, scene in shown}
 
 
 OUTPUTS = (
     Output(
         "engines",
-        "errors over frame time, maps of settings, sensitivity curves in engines",
-        figures=lambda study: figures(*_scenes(study.parts["engines"])),
+        "errors over frame time and sensitivity curves in engines",
+        figures=_figures,
         plot="studies.kinds.engines.figures:engines",
         shows="scenes in engines",
     ),
@@ -33,6 +28,7 @@ VIEWS = (
             Plot("error over iterations", "error", "iterations", "engine", log="xy"),
             Plot("error over the time of a frame", "error", "frame_seconds", "engine", along="iterations", log="xy"),
             Plot("error over substeps", "error", "substeps", "engine", log="xy"),
+            Plot("error by setting", "error", "iterations", "substeps", "map"),
             Plot("how runs end", "engine_status", "iterations", "substeps", "map"),
             Plot("error by engine and definition", "error", "engine", "definition", "map"),
             Plot("time of a frame", "frame_seconds", "iterations", "engine", log="xy"),

@@ -8,7 +8,6 @@ from springtune.safe_io.escapes import no_mathematics
 from ...output import labels, style
 from ...output.dataset import STATUS
 from ...output.selection import group, labels_of
-from .outputs import figures
 
 BEHAVIOUR_COLOURS = {"stable": "#f4f4f4", "decaying": "#b5cfe3", "growing": "#d07a1f", "NaN": "#4a0d1a"}
 """Darker from one to the next, in the order of the flags."""
@@ -23,9 +22,10 @@ STRAIN_LOADS = {"axial": "Force on the end", "follower-pressure": "Pressure that
 
 def stability(tree):
     """Figures of the experiments that a dataset has."""
-    plots = {"stability_maps": plot_stability_maps, "stability_strains": plot_stability_strains}
-    for stem in figures(group(tree, "stability").experiment.values.tolist()):
-        yield stem, plots[stem], {}
+    done = group(tree, "stability").experiment.values
+    for name, plot in {"maps": plot_stability_maps, "strains": plot_stability_strains}.items():
+        if name in done:
+            yield f"stability_{name}", plot, {}
 
 
 def _experiment(data, name):

@@ -4,16 +4,16 @@ from ...config.kind import Output
 from ...output.browse import Plot, View
 
 
-def figures(experiments):
-    """Figures of experiments, by stem."""
-    return {f"stability_{name}": {} for name in ("maps", "strains") if name in experiments}
+def _figures(study):
+    asked = {name for name, _ in study.parts["stability"]}
+    return {f"stability_{name}": {} for name in ("maps", "strains") if name in asked}
 
 
 OUTPUTS = (
     Output(
         "stability",
         "experiments on stability",
-        figures=lambda study: figures({name for name, _ in study.parts["stability"]}),
+        figures=_figures,
         plot="studies.kinds.stability.figures:stability",
         shows="experiments",
     ),
