@@ -1,6 +1,5 @@
 """Places to touch: a new definition is one file and so is a new mesh type; all that lists them finds it there."""
 
-import importlib
 import json
 import os
 import re
@@ -12,18 +11,10 @@ from pathlib import Path
 import pytest
 
 import springtune
-from springtune.mechanics.network import Network
-from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES, mesh_type
-from springtune.problem.boundary import held, weights
-from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS, definition
-from springtune.studies.runs import keys
+from springtune.mesh import mesh_type
+from springtune.springs import definition
 
 from tables import STUDIES
-
-STEEL = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
 
 CONTRIBUTING = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text()
 
@@ -34,71 +25,11 @@ RECIPES = {
 """What CONTRIBUTING.md tells to write, by the file's place in the package."""
 
 
-def outside_package(place):
-    """A recipe as it is written outside the package."""
-    package = f"springtune.{place.partition('/')[0]}"
-    text = RECIPES[place].replace("from ..", "from springtune.").replace("from . ", f"from {package} ")
-    return text.replace("from .", f"from {package}.")
-
-
 STUDY = STUDIES["places"]
-
-REGISTRIES = {"DEFINITIONS": DEFINITIONS, "MESH_TYPES": MESH_TYPES}
-
-
-def displacement(name, type_name="structured"):
-    """What 1 kN of traction does to a beam [m]."""
-    mesh, kind = MESH_TYPES[type_name](0.1, 0.02, 5e-3), LOADS["traction"].kind
-    springs = DEFINITIONS[name].springs(mesh, STEEL, 1e-3)
-    pattern = weights(mesh, kind)
-    network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
-    found = StaticProblem(network, pattern).linear(1e3 / springs.reference)
-    return float((found.displacements * pattern).sum())
 
 
 class TestOutsideThePackage:
     """A file of one's own, imported: the same decorator, nothing else."""
-
-    @pytest.fixture
-    def outside(self, tmp_path, monkeypatch):
-        """Import a module of some text; what is declared is taken out after the test."""
-        known = {what: set(registry) for what, registry in REGISTRIES.items()}
-        monkeypatch.syspath_prepend(tmp_path)
-        modules = []
-
-        def load(stem, text):
-            (tmp_path / f"{stem}.py").write_text(text)
-            modules.append(stem)
-            return importlib.import_module(stem)
-
-        yield load
-        for what, registry in REGISTRIES.items():
-            for name in set(registry) - known[what]:
-                registry.discard(name)
-        for stem in modules:
-            sys.modules.pop(stem)
-
-    def test_a_definition(self, outside, tmp_path):
-        outside("own_springs", outside_package("springs/twice.py"))
-        names = list(DEFINITIONS)
-        assert names[names.index("lattice") + 1] == "twice"
-        one = DEFINITIONS["twice"]
-        assert one.summary.startswith("Springs twice as stiff") and one.file == tmp_path / "own_springs.py"
-        assert displacement("twice") == pytest.approx(displacement("lattice") / 2, rel=1e-9)
-        digest = keys.definition_closure("twice").digest
-        assert digest not in {keys.definition_closure(name).digest for name in set(names) - {"twice"}}
-
-    def test_a_mesh_type(self, outside):
-        outside("own_mesh", outside_package("mesh/left.py"))
-        names = list(MESH_TYPES)
-        assert names[names.index("right") + 1] == "left"
-        one = MESH_TYPES["left"]
-        assert one.corners == 3 and one.summary == "Squares cut by parallel diagonals, the other way"
-        mesh = one(0.1, 0.02, 5e-3)
-        assert mesh.area == pytest.approx(2e-3)
-        assert displacement("lattice", "left") == pytest.approx(displacement("lattice", "right"), rel=0.01)
-        digest = keys.mesh_type_closure("left").digest
-        assert digest not in {keys.mesh_type_closure(name).digest for name in set(names) - {"left"}}
 
     @pytest.mark.parametrize(
         ("declare", "name"), [(definition, "lattice"), (mesh_type, "structured")], ids=["definition", "mesh type"]
@@ -109,14 +40,6 @@ class TestOutsideThePackage:
             @declare(name)
             def other(*_):
                 """Not to be."""
-
-    @pytest.mark.parametrize("registry", REGISTRIES.values(), ids=REGISTRIES)
-    def test_others_only_read(self, registry):
-        with pytest.raises(TypeError):
-            registry["new"] = None
-        with pytest.raises(KeyError, match="unknown .* 'nothing'; known: "):
-            registry["nothing"]
-        assert "nothing" not in registry and registry.get("nothing") is None
 
 
 REPORT = """

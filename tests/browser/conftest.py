@@ -169,24 +169,6 @@ def odd(tmp_path_factory):
     return written(tmp_path_factory.mktemp("odd"), made | {"/": root, "/shape_fields": holed})
 
 
-STRANGE = 'x=1), __import__("os").system("id") #\n\u2028"\\\u202e\U0001f600'
-
-
-@pytest.fixture(scope="session")
-def strange(tmp_path_factory):
-    """Page of a dataset whose dimension of beams and beams have a name that could be code."""
-
-    def renamed(data):
-        if "beam" not in data.dims:
-            return data
-        return data.rename(beam=STRANGE).assign_coords({STRANGE: [f"{one}{STRANGE}" for one in data.beam.values]})
-
-    tree = dataset("sensitivity")
-    tree["status"].attrs = ROOT.empty(LABELS).status.attrs
-    tree = tree.map_over_datasets(renamed)
-    return written(tmp_path_factory.mktemp("strange"), {one.path: one.to_dataset() for one in tree.subtree})
-
-
 @pytest.fixture(scope="session")
 def samples_alone(tmp_path_factory):
     """Page of samples without cells."""

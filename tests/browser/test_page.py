@@ -1,6 +1,5 @@
 """The page in a real browser: what it shows, how it answers, and that it asks for nothing."""
 
-import ast
 import os
 from pathlib import Path
 from urllib.request import url2pathname
@@ -11,7 +10,6 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
 from springtune.problem.compare import sign_sentence
-from springtune.studies.output.error_scale import ERROR_COLOURS
 
 CURVE = "springtune.views.cells.plots.curve.chart.sources.points.data.y.join()"
 SIZE = "springtune.views.cells.plots.size.chart.sources.points.data"
@@ -141,20 +139,6 @@ def test_hostile_texts_are_shown_as_texts(browser, small):
     assert not browser.ask("return document.querySelectorAll('h1 *').length")
 
 
-def test_names_of_strangers_are_no_code(browser, small, strange):
-    codes = []
-    for address in (small, strange):
-        browser.open(address)
-        codes.append(browser.ask("return document.querySelector('pre.code')?.textContent"))
-        assert all(line.isprintable() for line in codes[-1].split("\n"))
-    calls = [
-        [ast.unparse(one.func) for one in ast.walk(ast.parse(code)) if isinstance(one, ast.Call)] for code in codes
-    ]
-    assert calls[0] == calls[1]
-    labels = next(one for one in ast.walk(ast.parse(codes[1])) if isinstance(one, ast.Dict))
-    assert labels.keys[0].value in labels.values[0].value
-
-
 def test_a_group_that_nobody_knows_has_a_view(browser, small):
     browser.open(small)
     assert "weather" in views(browser)
@@ -211,19 +195,6 @@ def test_the_network_moves(browser, small):
     assert browser.ask(at)["x1"] != springs["x1"]
 
 
-def test_a_tile_of_the_map_is_a_cell(browser, small):
-    browser.open(small)
-    chart = "const chart = springtune.views.cells.plots.map.chart;"
-    browser.wait(f"{chart} return chart.cells?.length")
-    before = browser.ask(f"return {HEADING}")
-    browser.ask(
-        f"{chart} chart.sources.tiles.selected.indices = "
-        "[chart.cells.findIndex((one) => one.column === 1 && one.row === 1)]"
-    )
-    browser.wait(f"return {HEADING} !== arguments[0]", before)
-    assert browser.ask("return [springtune.places.mesh_type, springtune.places.definition]") == [1, 1]
-
-
 def text(browser, place):
     return browser.ask("return document.querySelector(arguments[0]).innerText", place)
 
@@ -273,19 +244,6 @@ class TestWhatIsSo:
             assert sign_sentence({"traction": 1, "compression": -1}) in text(browser, place)
         show(browser, "shapes")
         assert "other quantities: positive: too large" in text(browser, ".view-shapes")  # of an energy
-
-    def test_a_mesh_of_a_file_has_no_size(self, browser, odd):
-        browser.open(odd)
-        options = "return [...document.querySelectorAll('[data-dim=mesh_size] option')].map((one) => one.text)"
-        assert browser.ask(options) == ["as in file", "2 mm", "5 mm"]
-
-    def test_errors_have_the_colours_of_the_figures(self, browser, odd):
-        browser.open(odd)
-        assert browser.ask("return springtune.scale.colours") == list(ERROR_COLOURS)
-        browser.ask("const c = springtune.views.cells; c.root.fields.deformation_error.values.fill(-1.0);"
-                    "return springtune.choose({...springtune.places, load: 2})")  # fmt: skip
-        last = "rgb(" + ",".join(str(int(ERROR_COLOURS[-1][i : i + 2], 16)) for i in (1, 3, 5)) + ")"
-        assert set(browser.ask("return springtune.views.cells.plots.map.chart.sources.tiles.data.colour")) == {last}
 
     def test_a_hole_is_a_line_of_its_own_and_the_network_is_drawn(self, browser, odd):
         browser.open(odd)

@@ -2,7 +2,6 @@
 
 import io
 import json
-import os
 import re
 import runpy
 import shlex
@@ -19,7 +18,7 @@ import springtune
 from counting import counted
 from springtune.cli import COMMANDS, Shown, main
 from springtune.handover.formats import NET_FORMATS
-from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
+from springtune.mesh import MESH_TYPES, write_mesh
 from springtune.mesh.types import MeshType
 from springtune.prediction import choices as of_one_mesh
 from springtune.prediction.search import find_mesh
@@ -165,18 +164,6 @@ def validator():
     return jsonschema.Draft202012Validator(schema)
 
 
-def test_a_home_that_cannot_be_written_is_one_note(tmp_path, monkeypatch, capsys):
-    from springtune.cli.run import set_cache
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    for home, said in ((tmp_path, ""), ("/dev/null", "note: /dev/null/.cache cannot be written; .snakemake/cache")):
-        monkeypatch.setenv("HOME", str(home))
-        set_cache()
-        assert capsys.readouterr().err.startswith(said)
-    assert os.environ["XDG_CACHE_HOME"] == str(tmp_path / ".snakemake/cache")
-
-
 class TestSchema:
     def test_it_is_kept_in_step(self):
         assert (CONFIG / SCHEMA).read_text() == schema_text(), RENEW
@@ -245,24 +232,6 @@ class TestPredict:
         write_mesh("own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
         result = run("predict", *shlex.split(call))
         assert result.exit_code == 0 and not [part for part in said if part not in result.stdout], result.stdout
-
-    def test_definitions_that_refuse_a_mesh_are_left_out(self, tmp_path):
-        """Rectangles three times as long as high: springs along them would be negative."""
-        square = braced(0.1, 0.06, 5e-3)
-        write_mesh(tmp_path / "flat.vtu", Mesh(square.points * [1.0, 1 / 3], square.triangles, square.quads))
-        result = run("predict", *STEEL, "--mesh", tmp_path / "flat.vtu")
-        assert result.exit_code == 0 and "recommended: element-fit; with springs alone: element-fit" in result.stdout
-        assert not re.search(r"\b(patch|baudet)\b[^-]", result.stdout.replace("patch test", ""))
-
-    def test_large_meshes_are_refused(self, tmp_path):
-        result = run("predict", *STEEL, "--size", "0.1 mm")
-        assert result.exit_code == 1 and "particles, more than the 100000 that are solved here" in result.stderr
-        write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 0.14e-3))
-        result = run("predict", *STEEL, "--mesh", tmp_path / "own.vtu")
-        assert result.exit_code == 1
-        assert (
-            "own.vtu' has 102960 particles, more than the 100000 that are solved here; give a coarser" in result.stderr
-        )
 
 
 @pytest.mark.parametrize(

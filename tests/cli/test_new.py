@@ -98,14 +98,6 @@ class TestNew:
         scenes = ran("config/my-study.yaml")
         assert float(abs(scenes.deformation_error).max()) < 0.1
 
-    @pytest.mark.parametrize("given", ["elsewhere/mine", "elsewhere/mine.yaml", "elsewhere/mine.yml"])
-    def test_a_path_is_taken_as_it_is(self, checkout, given):
-        (checkout / "elsewhere").mkdir()
-        assert run("new", given).exit_code == 0
-        (path,) = (checkout / "elsewhere").iterdir()
-        assert path.suffix == (Path(given).suffix or ".yaml") and len(load_study(path).scenes) == 2
-        assert "$schema=../config/study.schema.json" in path.read_text()
-
     def test_outside_of_a_checkout_it_is_written_here(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         assert run("new", "my-study").exit_code == 0
@@ -129,12 +121,6 @@ class TestNew:
         before = {path for path in checkout.rglob("*.yaml")}
         refused(run("new", *given), code, said)
         assert {path for path in checkout.rglob("*.yaml")} == before
-
-    def test_a_folders_name_is_a_name_like_any_other(self, checkout):
-        assert run("new", "config").exit_code == 0 and Path("config/config.yaml").is_file()
-
-    def test_a_place_that_takes_no_file_is_told(self):
-        refused(run("new", "/proc/self/mine"), 1, "/proc/self/mine.yaml: cannot be written: ", "; name another place")
 
 
 class TestRun:

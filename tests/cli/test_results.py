@@ -132,18 +132,6 @@ class TestInfo:
             assert line in lines, line
         assert any(line.startswith("/sensitivity 10 beam 2, mesh_type 2") for line in lines)
 
-    def test_a_dataset_of_all_kinds_is_told(self, tmp_path):
-        tree = every()
-        tree.attrs = {"springtune_version": "0"}
-        tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
-        result = run("info", tmp_path)
-        assert result.exit_code == 0 and "  /benchmark " in result.stdout
-        tree.attrs["title"] = "<i>"
-        tree.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
-        found = st.info(tmp_path / "other.nc")
-        assert repr(found) == str(found) and str(found).startswith("<i>\nstudy unknown")
-        assert found._repr_html_().startswith("<pre>&lt;i&gt;\nstudy unknown")
-
     def test_what_is_no_dataset_is_told_in_one_line(self, tmp_path):
         refused(run("info", tmp_path / "none"), "there is no such dataset")
         (tmp_path / "text.nc").write_text("text")
@@ -220,23 +208,3 @@ def test_where_nothing_is_solved_the_table_of_scenes_is_empty(tmp_path):
     assert scene_files.write(tree, tmp_path) == [Path("scenes.csv")]
     assert [path.name for path in tmp_path.iterdir()] == ["scenes.csv"]
     assert len((tmp_path / "scenes.csv").read_text().splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("chosen", "said"),
-    [
-        ({"mesh_size": None}, "choose one mesh_size"),
-        ({"beam": "1x1"}, "nothing has beam '1x1'; there is '100x20', '200x40'"),
-        ({"load": "none"}, "nothing has load 'none'; there is 'traction'"),
-        ({"loads": "none"}, "no dimension 'particle' to choose of|no dimension 'loads'"),
-    ],
-)
-def test_a_refused_field_names_what_there_is(chosen, said):
-    place = {"beam": "200x40", "mesh_type": "free", "mesh_size": 5e-3} | chosen
-    with pytest.raises(ValueError, match=said):
-        st.field(every(), **{name: label for name, label in place.items() if label is not None})
-
-
-def test_a_dataset_without_fields_has_none(path):
-    with st.open(path) as tree, pytest.raises(ValueError, match="no group '/fields'; add 'deformed' or 'paraview'"):
-        st.field(tree)

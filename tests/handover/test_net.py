@@ -15,7 +15,7 @@ from mechanics import angle_forces, area_forces, area_of, spring_forces
 from springtune.cli import main
 from springtune.handover.formats import READERS
 from springtune.handover.newton import membrane
-from springtune.mechanics.energies import AngleEnergy, AreaEnergy
+from springtune.mechanics.energies import AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
 from tables import refused_calls
@@ -209,25 +209,6 @@ def test_cells_of_both_kinds(ending, tmp_path):
     assert np.array_equal(forces_of(back, moved), forces_of(net, moved))
 
 
-def test_terms_of_one_kind_are_one():
-    """Energies are in proportion to their moduli."""
-    mesh = st.make_mesh(BEAM, "structured", "5 mm")
-
-    def twice(mesh, material, thickness):
-        """Two area energies, and one of angles."""
-        ones = np.ones(len(mesh.triangles))
-        energies = (
-            *(AreaEnergy(mesh.points, mesh.triangles, part * ones) for part in (0.25, 0.5)),
-            AngleEnergy(mesh.points, mesh.triangles, 1e-6 * ones),
-        )
-        return st.Springs(1e8, np.ones(len(mesh.edges)), energies)
-
-    net = st.SpringNet.from_mesh(mesh, STEEL, twice)
-    assert [terms.kind for terms in net.energies] == ["area", "angle"]
-    assert np.allclose(net.energies[0].values["modulus"], 0.75e8, rtol=1e-9)
-    assert net.header["formula"] == "Two area energies, and one of angles" and net.header["definition"] == "twice"
-
-
 class TestHeader:
     @pytest.mark.parametrize("load", ["traction", "pressure", "compression", "follower-pressure"])
     def test_errors_are_those_of_a_solve(self, load):
@@ -256,13 +237,6 @@ class TestHeader:
         # What a load holds makes no mode higher: free, the step is no longer than held.
         free = st.SpringNet.from_mesh(scene.mesh, STEEL, definition, thickness=BEAM.thickness)
         assert free.header["largest_stable_step"]["central-difference"] <= steps["central-difference"] * (1 + 1e-9)
-
-
-class TestScene:
-    def test_springs_that_were_changed_are_written_as_they_are(self, tmp_path):
-        scene = scene_of("lattice")
-        replace(scene.springs, reference=2 * scene.springs.reference).write(tmp_path / "net.json")
-        assert (st.SpringNet.read(tmp_path / "net.json").stiffness == 2 * net_of(scene).stiffness).all()
 
 
 class TestResult:
@@ -370,30 +344,12 @@ class TestFiles:
             st.SpringNet.read(tmp_path / "net.csv")
         assert f" {net.header['mesh'][table]} {table}, " in str(error.value)
 
-    def test_tables_of_a_net_of_before_are_gone(self, tmp_path):
-        net_of(scene_of("lattice")).write(tmp_path / "net.csv")
-        net_of(scene_of("lattice", "braced")).write(tmp_path / "net.csv")
-        found = sorted(path.name for path in tmp_path.iterdir())
-        assert found == ["net.csv", "net.particles.csv", "net.quads.csv"]
-
     def test_a_missing_file_and_an_unknown_ending(self, tmp_path):
         with pytest.raises(ValueError, match=r"net\.csv: there is no such file"):
             st.SpringNet.read(tmp_path / "net.csv")
         for do in (st.SpringNet.read, net_of(scene_of("lattice")).write, scene_of("lattice").springs.write):
             with pytest.raises(ValueError, match=r"'\.stl' is no format of springs; give a name ending in \.csv"):
                 do(tmp_path / "net.stl")
-
-    def test_energies_of_ones_own_are_refused(self, tmp_path):
-        class Own(AreaEnergy):
-            pass
-
-        class Other:
-            points = corners = None
-
-        mesh = scene_of("lattice").mesh
-        springs = st.Springs(1e8, np.ones(len(mesh.edges)), (Other(),))
-        with pytest.raises(st.DefinitionError, match="energy Other cannot be written out"):
-            st.SpringNet.from_mesh(mesh, replace(STEEL, density=None), springs=springs)
 
 
 class TestCommand:

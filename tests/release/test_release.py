@@ -153,18 +153,6 @@ def test_what_is_built_of_a_clone_has_its_commit(tree, tmp_path):
         assert "springtune/commit.txt" not in file.namelist()
 
 
-def test_the_same_files_make_the_same_bytes(release, tree, tmp_path):
-    for one, again in zip(release, built(tree, tmp_path)):
-        assert one.read_bytes() == again.read_bytes(), one.name
-
-
-def test_twine_has_nothing_to_say(release, tmp_path):
-    done("uv", "venv", "--quiet", tmp_path / "venv")
-    done("uv", "pip", "install", "--quiet", "--python", tmp_path / "venv", "twine")
-    said = done(tmp_path / "venv/bin/python", "-m", "twine", "check", "--strict", *release)
-    assert said.count("PASSED") == 2 and "WARNING" not in said, said
-
-
 # -- what is installed -------------------------------------------------------------------------------------------------
 
 
@@ -233,21 +221,6 @@ def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, s
         **read_only,
     ).returncode
     assert {path: path.stat().st_mtime_ns for path in empty.parent.rglob("*")} == before
-
-
-def test_studies_of_the_package_run(call, read_only):
-    """With the files that they name: the paper's is that of a run without a study."""
-    told = call("springtune", "run", "--dry-run", "--cores", 1, **read_only)
-    assert told.returncode == 0 and "results/paper" in told.stdout + told.stderr, told.stderr
-    program = (
-        "from springtune.studies.kinds import load_study\n"
-        "from springtune.studies.runs.source import CONFIG_FOLDER, workflow_folder\n"
-        "for path in sorted((workflow_folder() / CONFIG_FOLDER).glob('*.yaml')):\n"
-        "    print(path.stem, len(load_study(path).scenes))\n"
-    )
-    told = call("python", "-c", program, **read_only)
-    assert told.returncode == 0 and len(told.stdout.splitlines()) >= 10, told.stderr
-    assert not (call.here / "results").exists()
 
 
 def test_the_source_runs_a_study(call, empty, release):

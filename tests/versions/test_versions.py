@@ -200,15 +200,6 @@ def test_every_python_agrees_with_the_newest_packages(version, study, usual, tmp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("version", ["3.3.7", "3.17.0"])
-def test_springs_hold_in_mujoco_3(version, tmp_path):
-    """The oldest one that is supported, and the last of version 3."""
-    python = environment(tmp_path / "venv", sys.executable, [*NEEDED, f"mujoco=={version}"])
-    for tests in ("tests/handover/test_simulators.py", "tests/programs/test_mujoco_engine.py"):
-        physics(python, tests)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "packages",
     [

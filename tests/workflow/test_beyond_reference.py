@@ -82,17 +82,6 @@ def test_against_finite_strain_what_is_left_is_the_mesh(tree, run):
     assert "nonlinear networks against finite strain" in (run.folder / "results/beyond/summary.txt").read_text()
 
 
-def test_nothing_is_calibrated_beyond_the_linear_reference(tree):
-    root, curves = tree.to_dataset(), tree["sensitivity"].to_dataset()
-    place = {"beam": "slender", "mesh_size": 2e-3, "mesh_type": "structured", "load": "bending", "material": "soft"}
-    best = curves.best_stiffness.sel(place)
-    assert np.isnan(best.sel(kinematics="nonlinear")) and np.isfinite(best.sel(kinematics="linear"))
-    cell = root.sel(place | {"definition": "calibrated"})
-    assert np.isnan(cell.displacement.sel(kinematics="nonlinear")) and cell.status.sel(kinematics="linear") == 1
-    message = cell.message.sel(kinematics="nonlinear").item()
-    assert "200x10_structured_2mm in bending of 0.0020833 N" in message and "turns by 0.5 rad" in message
-
-
 def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
     """References that did not converge are stored with their message alone."""
     lost = "bending reference, 10 times as long as high, nu = 0.3: relative rounding error 2.0e-04"

@@ -42,13 +42,3 @@ def test_no_character_of_a_path_is_the_shells(repository, tmp_path):
     assert (results / "results/-mine/dataset.nc").is_file()
     assert locks.claimed(results / "results/-mine") == config / "-mine.yaml"
     assert not [*tmp_path.rglob("PWNED*")] and not (repository / "PWNED").exists()
-
-
-def test_a_folder_that_results_cannot_be_in_is_refused(run):
-    folder = run.folder / "\udcfc"
-    folder.mkdir()
-    run.write("elsewhere.yaml", STUDY)
-    code, output = run.snakemake("elsewhere.yaml", "--directory", folder)
-    assert code == 1 and "Traceback" not in output, output
-    assert r"/\udcfc': not UTF-8, as texts of results are; rename the file or folder" in output
-    assert not (folder / "results").exists()

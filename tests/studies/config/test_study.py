@@ -40,15 +40,6 @@ def mesh_name(mesh):
 
 
 class TestExpansion:
-    def test_counts(self, load):
-        study = load(SMALL)
-        assert len(study.meshes) == 8
-        assert len(study.scenes) == 8 * 3 * 2 + 1
-        assert len(study.curves) == 8 * 2
-        assert len(study.references) == 3
-        counts = [(grid.name, len(grid.scenes), len(grid.curves)) for grid in study.grids]
-        assert counts == [("pull", 48, 16), ("push", 1, 0)]
-
     def test_values_are_si(self, load):
         study = load(SMALL)
         long, short = Beam(0.2, 0.03, 0.001, "long"), Beam(0.1, 0.02, 0.002, "short")
@@ -79,9 +70,6 @@ class TestExpansion:
         for name in ("meshes", "scenes", "curves", "references", "axes"):
             assert getattr(once, name) == getattr(again, name)
         assert len(again.grids) == 4
-
-    def test_names_are_texts_whatever_yaml_makes_of_them(self, load):
-        assert load(SMALL.replace("short", "1e3").replace("long", "no")).axes["beam"] == ("no", "1e3")
 
 
 class TestCalibrationCurves:
@@ -222,17 +210,6 @@ def test_quick_is_small_but_has_everything():
     assert set(study.outputs) == set(outputs()) - {"sweep", "shapes", "engines"}
 
 
-class TestMeshFiles:
-    def test_is_a_mesh_type_of_its_own(self, load, tmp_path):
-        (tmp_path / "own.msh").write_text("any")
-        study = load(study_text("small mesh_files"))
-        short = Beam(0.1, 0.02, 0.002, "short")
-        mesh = MeshSpec(short, "own", 0.003, tmp_path / "own.msh", 1e-3)
-        assert study.meshes[-1] == mesh and mesh_name(mesh) == "short_own_3mm"
-        assert study.axes["mesh_type"] == ("structured", "free", "own")
-        assert study.mesh_files == {("own", "short", 0.003): mesh}
-
-
 class TestDefinitions:
     def test_moduli_of_every_pair(self, load):
         study = load(study_text("small moduli"))
@@ -249,19 +226,6 @@ class TestDefinitions:
 
 
 # -- bad input ---------------------------------------------------------------------------------------------------------
-
-
-def test_lines_of_a_table_are_lines(refusal, tmp_path):
-    (tmp_path / "rows.csv").write_text('beam,force\nshort,"1 \x1b[2KkN"\n')
-    message = refusal(changed(("    beam: short\n", "    rows: rows.csv\n"), ("    force: 20 kN\n", "")))
-    assert message == r"rows.csv:2: '1 \x1b[2KkN' has '\x1b'; write one line of characters that can be seen"
-
-
-def test_no_folder_writes_lines_of_a_message(tmp_path):
-    (tmp_path / "a\nb").mkdir()
-    with pytest.raises(StudyError) as caught:
-        load_study(tmp_path / "a\nb/none.yaml")
-    assert r"a\nb/none.yaml: cannot be read" in str(caught.value)
 
 
 @pytest.mark.parametrize("key", ["laying", "stability", "benchmark", "samples"])
@@ -341,19 +305,6 @@ class TestPressureAndLaying:
         assert forces == pytest.approx({"pressure": -0.1e6 * 0.1 * 2e-3, "follower-pressure": -0.1e6 * 0.1 * 2e-3})
         # A force that follows is no F/k: it has no curve.
         assert [curve.load for curve in study.curves if "pressure" in curve.load] == ["pressure"]
-
-    def test_strips_and_their_references(self, load):
-        study = load(study_text("small laying"))
-        strips = [one for one in study.parts["laying"] if "definition" in one[0]]
-        references = [one for one in study.parts["laying"] if "definition" not in one[0]]
-        assert (len(strips), len(references)) == (2 * 2 * 2, 2)
-        # Each on three meshes, the finest first: their spread says how well the reference is known.
-        assert all(values["mesh_sizes"] == pytest.approx([1e-3, 1.25e-3, 1.6e-3]) for _, values in references)
-        assert {values["definition"] for _, values in references} == {"delingette"}
-        labels, values = strips[0]
-        assert labels == {"definition": "uniform", "mesh_size": 1e-3, "loading": "pressure", "friction": 0.0}
-        assert values["strip"]["length"] == 0.1 and values["mesh_sizes"] == [1e-3]
-        assert {0.001, 0.002} <= set(study.axes["mesh_size"]) and "uniform" in study.axes["definition"]
 
 
 # -- the benchmark -----------------------------------------------------------------------------------------------------

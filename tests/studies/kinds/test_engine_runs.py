@@ -11,7 +11,6 @@ import xarray as xr
 
 import springtune as st
 from springtune.studies.kinds.engines import RUN_ENDS
-from springtune.studies.kinds.engines.kind import KIND
 from springtune.studies.output.comparison import compare
 from springtune.studies.runs import keys
 
@@ -128,28 +127,6 @@ def test_runs_are_every_combination_once_and_in_a_canonical_order(load):
     assert labels == {("float64", 1 / 60), ("float64", 5e-3)}
     backwards = text.replace("[1, 100]", "[100, 1]").replace("[toy, xpbd]", "[xpbd, toy]")
     assert load(backwards + CURVE.replace("ENGINES", "xpbd")).parts["engines"] == runs
-
-
-def test_an_engine_without_iterations_has_one(load):
-    st.ENGINES.discard("toy")
-    st.engine("toy", program="toys", iterates=False)(Toy)
-    runs = load(STUDY.replace("ENGINES", "toy")).parts["engines"]
-    assert len(runs) == 4 and {run.labels["iterations"] for run in runs} == {1}
-
-
-def test_what_is_not_installed_is_said_before_a_run(load):
-    ((what, count, said),) = KIND.summary(load(STUDY.replace("ENGINES", "toy, missing")).parts["engines"])
-    assert (what, count) == ("engines", 16) and said == "runs in missing, toy; not installed: missing"
-
-
-def test_a_tolerance_ends_a_run_sooner(collected):
-    text = STUDY.replace("[1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "20")
-    exact, near = (
-        collected("xpbd", text=text.replace("  runs:", f"  tolerance: {tolerance}\n  runs:"))["engines"].to_dataset()
-        for tolerance in ("1e-9", "1e-3")
-    )
-    assert near.frames.item() < exact.frames.item()
-    assert abs(near.displacement.item() / exact.displacement.item() - 1) < 1e-3
 
 
 def test_too_many_runs_and_cells_are_refused(refusal):

@@ -21,7 +21,6 @@ from springtune.springs import DEFINITIONS
 from springtune.studies.kinds.samples import designs, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
-from springtune.studies.kinds.samples.figures import plot_sobol
 from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
 from springtune.studies.runs.attempts import Attempts
@@ -154,25 +153,6 @@ class TestIndices:
         np.testing.assert_allclose(ours["first_order"], theirs.first_order.ravel(), rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(ours["total_order"], theirs.total_order.ravel(), rtol=1e-9, atol=1e-9)
 
-    def test_bands_are_of_a_seed_and_shrink_by_the_root_of_the_size(self):
-        narrow, wide = (sobol_indices(*self.saltelli(self.ishigami, size, 3)) for size in (4096, 256))
-        again = sobol_indices(*self.saltelli(self.ishigami, 256, 3))
-        assert all((again[name] == values).all() for name, values in wide.items())
-        ratio = np.divide(*(one["total_order_high"] - one["total_order_low"] for one in (wide, narrow)))
-        assert ((ratio > 2.5) & (ratio < 6)).all()  # 4 but for chance
-
-    @pytest.mark.parametrize("size", [1e-300, 1e300])
-    def test_values_of_any_size(self, size):
-        at_a, at_b, at_ab = self.saltelli(lambda points: points @ [1.0, 2.0], 64, 2)
-        found = sobol_indices(at_a, at_b, at_ab)
-        scaled = sobol_indices(size * at_a, size * at_b, size * at_ab)
-        np.testing.assert_allclose(scaled["first_order"], found["first_order"], rtol=1e-9)
-
-    @pytest.mark.parametrize("rows", [0, 1, 8])
-    def test_what_does_not_vary_has_none(self, rows):
-        found = sobol_indices(np.ones(rows), np.ones(rows), np.ones((2, rows)))
-        assert np.isnan([*found.values()]).all()
-
 
 class TestOnce:
     """What is solved once for many scenes is what each of them would be."""
@@ -283,14 +263,6 @@ class TestRuns:
         assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
-    def test_particles_are_those_of_the_mesh_type_whatever_was_solved_before(self, tmp_path):
-        types = ("structured", "right", "structured")
-        first, _, third = (
-            networks(tmp_path, ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {name}"))[1][0] for name in types
-        )
-        assert (first["particles"] > 0).all()
-        assert (third["particles"] == first["particles"]).all()
-
     def test_a_sample_needs_neither_grids_nor_beams_nor_materials(self, here):
         """Its values are those beside a grid; other groups of scenes are not there."""
         beside, _ = run()
@@ -311,19 +283,6 @@ class TestRuns:
         tree, _ = run(("size: 16", "size: 64\n  design: sobol"))
         assert "sobol" not in tree and "role" not in tree["samples"].coords
         assert tree["samples"].sizes["sample"] == 64
-
-    def test_parameters_that_grids_sweep_too_can_be_selected(self, here):
-        """A coordinate of points must not have the name of a dimension of the grids."""
-        swept = ("force: 1 kN", "force: [1 kN, 2 kN]\n    young_modulus: [1 GPa, 2 GPa]")
-        tree, _ = run(("size: 16", "size: 8\n  design: sobol"), swept)
-        data = tree["samples"].to_dataset()
-        assert data.sample_force.dims == data.sample_young_modulus.dims == data.thickness.dims == ("sample",)
-        assert data.force.dims == ("force",)
-        one = data.sel(load="traction", definition="lattice").isel(sample=3)
-        assert float(one.deformation_error) == data.deformation_error.values[3].item()
-        assert float(one.sample_force) == data.sample_force.values[3]
-        mean = data.mean("sample").deformation_error.sel(load="traction", definition="lattice")
-        assert float(mean) == pytest.approx(data.deformation_error.values.mean())
 
     def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
         one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
@@ -437,40 +396,3 @@ def file_of(content):
     """The only file that a job makes."""
     (file,) = content["files"]
     return Path(content["folder"]) / f"{file['name']}.h5"
-
-
-class TestRefusals:
-    def test_a_definition_that_does_not_scale_is_refused(self, here):
-        from springtune.springs import Springs, definition
-
-        @definition("stiffening")
-        def stiffening(mesh, material, thickness):
-            """Springs that do not go with E t."""
-            return Springs(1.0 + material.young_modulus * thickness, np.ones(len(mesh.edges)))
-
-        try:
-            definition = ("definition: lattice\n  p", "definition: stiffening\n  p")
-            study = load_text(here, study_text(("size: 16", "size: 8"), definition, (MODULI, "1 MPa")))
-            content, file = content_of("sample", study, here)
-            solve.run(content, Attempts({}))
-            key = next(key for key, scene in file["results"].items() if scene["definition"] == "stiffening")
-            path = here / "samples" / f"{file['name']}.h5"
-            found = store.read(path, [key], ("status",))[key]
-            assert (found["status"] == Status.FAILED).all()
-            assert "not in proportion" in found["messages"]["0"]
-        finally:
-            DEFINITIONS.discard("stiffening")
-            shutil.rmtree(here / "samples", ignore_errors=True)
-
-
-class TestFigures:
-    def test_bars_are_total_orders(self, linear):
-        panels = plot_sobol(linear, load="traction")
-        titles = [panel.get_title(loc="left") for panel in panels]
-        assert titles == ["deformation error, lattice", "deformation error, area", "displacement, lattice",
-                          "displacement, area", "best stiffness"]  # fmt: skip
-        words = [tick.get_text() for tick in panels[0].get_yticklabels()]
-        assert words == ["length", "height", "mesh size", "Young's modulus", "Poisson's ratio", "force"]
-        widths = [bar.get_width() for bar in panels[0].patches[: len(words)]]
-        total = linear["sobol"].total_order.sel(quantity="deformation_error", load="traction", definition="lattice")
-        np.testing.assert_allclose(widths, np.maximum(total, 0))

@@ -17,7 +17,6 @@ from springtune.studies.kinds.bodies.plan import shape_mesh_key, shape_reference
 from springtune.studies.kinds.bodies.shape_expand import READ_AT_ONCE
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
-from springtune.studies.output.export import export
 from springtune.studies.runs.rerun import output_files
 
 from campaigns import do_stages, load_text
@@ -52,19 +51,6 @@ def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
 # -- what it expands to ------------------------------------------------------------------------------------------------
 
 
-def test_scenes_are_in_one_order_and_each_once(load):
-    one = load(COOK).shapes
-    again = "  again: {shape: cook, mesh_size: 8 mm, material: third, definition: [lattice], kinematics: linear}\n"
-    two = load(COOK.replace("[16 mm, 8 mm]", "[8 mm, 16 mm]") + again, "other.yaml").shapes
-    assert one.scenes == two.scenes and len(one.scenes) == 4
-    assert [(scene.mesh_size, scene.definition) for scene in one.scenes] == [
-        (8e-3, "lattice"), (8e-3, "delingette"), (16e-3, "lattice"), (16e-3, "delingette"),
-    ]  # fmt: skip
-    assert one.referred == (("cook", "third", "shear"),)
-    without = load(COOK.replace("kinematics: linear", "reference: false"), "without.yaml").shapes
-    assert not without.referred and without.scenes[0].kinematics == "nonlinear"
-
-
 def test_keys_know_no_labels(load):
     """A quantity that is renamed, or of which another value is expected, a load, a shape: nothing is solved again."""
     one = load(COOK)
@@ -83,17 +69,6 @@ def test_keys_know_no_labels(load):
     assert (
         shape_scene_task(one, one.shapes.scenes[0])["key"] != shape_scene_task(stiffer, stiffer.shapes.scenes[0])["key"]
     )
-
-
-def test_grids_and_shapes_share_the_axes_of_a_dataset(load):
-    grids = """\
-beams: {small: {length: 50 mm, height: 10 mm}}
-grids: {one: {beam: small, mesh_type: structured, mesh_size: 5 mm, material: third, load: traction, force: 1 N,
-              definition: patch, sensitivity: false}}
-"""
-    study = load(COOK + grids)
-    assert study.axes["load"] == ("traction", "shear") and study.axes["mesh_size"] == (5e-3, 8e-3, 16e-3)
-    assert study.axes["definition"] == ("lattice", "patch", "delingette") and study.axes["shape"] == ("cook",)
 
 
 # -- what becomes of it ------------------------------------------------------------------------------------------------
@@ -341,14 +316,6 @@ def test_figures_of_two_loads_never_share_a_name(refusal):
     assert "figures of shape 'a_B' under 'c' and of 'a' under 'b_c' would have one name" in message
 
 
-def test_a_scene_that_cannot_be_stated_is_a_hole(load, tmp_path):
-    """All its force is on what is held: known once there is a mesh."""
-    text = COOK.replace("forces: {right: [0, 1 N]}", "forces: {left: [0, 1 N]}")
-    data = scenes(load(text), tmp_path / "results/study")
-    assert {STATUS[number] for number in data.status.values.ravel()} == {"failed"}
-    assert all("neither pulls what is free" in message for message in data.message.values.ravel().tolist())
-
-
 def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
     """Each law has a reference; what has none of its own has no error there, and what fails says why."""
     config = yaml.safe_load(COOK)
@@ -374,15 +341,3 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
     assert np.isnan(references.sel(load="push")).all()
     why = str(finite.reference_message.sel(load="push", law="rubber").item())
     assert "shape 'cook', load 'push': no " in why and "% of the load" in why
-
-
-def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tmp_path):
-    study = load(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
-    tree, _ = done(study, tmp_path / "results/study")
-    with pytest.raises(ValueError, match="--group /: the group has no variables; give one of shapes, shape_fields"):
-        export(tree, tmp_path / "table.csv")
-    with pytest.raises(ValueError, match="nor has its study beams; 'shape_fields' has those of shapes: take"):
-        st.field(tree, shape="cook")
-    assert "rows" in export(tree, tmp_path / "table.csv", "shapes")
-    with pytest.raises(ValueError, match="the dataset has no scenes of beams"):
-        st.plot_size(tree, beam="200x40")

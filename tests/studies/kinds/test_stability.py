@@ -1,19 +1,9 @@
 """The section `stability` of a study, and its stage."""
 
-from springtune.studies.kinds.stability import EXPERIMENTS, ONCE
 from springtune.studies.runs import attempts, store
 from springtune.studies.runs import keys as code
 
 from tables import STUDIES
-
-
-def test_experiments_are_one_a_definition_or_one_in_all(load):
-    found = load(STUDIES["stability"])
-    names = [name for name, _ in found.parts["stability"]]
-    assert all(names.count(name) == (1 if name in ONCE else 2) for name in EXPERIMENTS)
-    first = next(iter(found.parts["stability"].values()))
-    assert first["mesh_sizes"] == [2.5e-3, 5e-3] and first["material"]["density"] == 7850.0
-    assert set(found.axes["definition"]) == {"uniform", "lattice", "delingette"}
 
 
 def test_output_without_experiments_is_refused(refusal):

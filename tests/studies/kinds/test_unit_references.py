@@ -8,7 +8,6 @@ from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies import any_reference, collect
 from springtune.studies.kinds.bodies.kind import summary
 from springtune.studies.kinds.bodies.plan import (
-    box_of,
     expected_solves,
     interpolants,
     reference_of,
@@ -87,16 +86,6 @@ def test_values_added_inside_the_box_leave_the_interpolant_as_it_is(load):
 )
 def test_where_whole_fields_are_asked_for_references_are_solved_by_themselves(load, options):
     assert interpolants(load(lengths(MANY), **options)) == {}
-
-
-def test_boxes_hold_what_they_are_made_of():
-    random = np.random.default_rng(4)
-    for _ in range(200):
-        aspects, nus = np.exp(random.uniform(-3, 5, 6)), random.uniform(-0.99, 0.5, 6)
-        (first, last), (least, largest) = box_of(set(zip(aspects, nus)))
-        assert 0 < first <= aspects.min() <= aspects.max() <= last <= 1.6 * aspects.max()
-        assert -1 < least <= nus.min() <= nus.max() <= largest <= 0.5
-        assert box_of({(first, least), (last, largest)}) == ((first, last), (least, largest))
 
 
 def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):

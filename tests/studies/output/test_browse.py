@@ -6,7 +6,6 @@ import re
 import zlib
 
 import h5py
-import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -73,15 +72,6 @@ class TestPage:
                 assert held == set(map(str, data.variables)) - set(map(str, data.dims)), node.path
         assert groups["/weather"]["dims"][0] == {"name": "town", "size": 1, "labels": ["here"]}
         assert "labels" not in groups["/weather"]["dims"][1]  # a dimension without labels
-
-    def test_texts_of_one_letter_may_be_bytes(self, path, tmp_path):
-        """So does netCDF's own library write them, such as the units of a length."""
-        copy = tmp_path / "copy.nc"
-        copy.write_bytes(path.read_bytes())
-        with h5py.File(copy, "r+") as file:
-            file["fields/x"].attrs["units"] = np.bytes_("m")
-        fields = next(group for group in content(page(copy))["groups"] if group["path"] == "/fields")
-        assert next(row for row in fields["variables"] if row["name"] == "x")["units"] == "m"
 
     def test_what_is_too_large_is_named(self, path):
         with h5py.File(path) as file:

@@ -13,8 +13,8 @@ from matplotlib.text import Text
 from PIL import Image
 
 import springtune as st
-from springtune.studies.config.kind import FORMATS, Output, outputs
-from springtune.studies.output import present, style
+from springtune.studies.config.kind import outputs
+from springtune.studies.output import style
 from springtune.studies.output.drawing import NETWORK_LINE
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import closure
@@ -77,31 +77,6 @@ def test_a_plot_returns_axes_with_something_on_them_and_leaves_settings_as_they_
     assert {panel.figure.number for panel in np.ravel(axes)} == set(plt.get_fignums())
 
 
-@each
-def test_a_plot_draws_on_axes_and_figures_that_it_is_given(tree, plot):
-    selection, count = EVERY_PLOT[plot]
-    figure = Figure(figsize=(7, 5))
-    given = figure.subplots(int(np.prod(count or 1)), squeeze=False)[:, 0]
-    place, size = [panel.get_position().bounds for panel in given], figure.get_size_inches().tolist()
-    axes = plot(tree, given if count else given[0], **selection)
-    assert list(np.ravel(axes)) == list(given) and all(panel.has_data() for panel in given)
-    figure.draw_without_rendering()  # nothing that cannot be drawn
-    if not np.any([panel.get_aspect() != "auto" for panel in given]):
-        assert [panel.get_position().bounds for panel in given] == place
-    assert figure.get_size_inches().tolist() == size
-
-    figure = Figure(figsize=(7, 5))
-    axes = plot(tree, figure, **selection)
-    assert all(panel.figure is figure for panel in np.ravel(axes)) and not plt.get_fignums()
-    assert figure.get_size_inches().tolist() == [7, 5]
-
-
-@pytest.mark.parametrize("plot", [plot for plot, (_, count) in EVERY_PLOT.items() if count], ids=lambda p: p.__name__)
-def test_too_few_axes_are_refused(tree, plot):
-    with pytest.raises(ValueError, match=r"panels, ax has 1 Axes"):
-        plot(tree, Figure().subplots(), **EVERY_PLOT[plot][0])
-
-
 # -- what they show ----------------------------------------------------------------------------------------------------
 
 
@@ -122,17 +97,6 @@ def test_a_sensitivity_curve_carries_the_errors_of_the_dataset(tree):
     assert "200x40 mm, free, steel, traction" in axes.get_title("left")
     reference = tree.reference_displacement.sel(beam="200x40", material="steel", load="traction")
     assert f"reference {1e3 * float(reference):.4g} mm" in axes.get_title("left")
-
-
-def test_unstable_points_of_a_curve_are_thin(tree):
-    data = tree["sensitivity"].to_dataset()
-    data["status"] = data.status.copy()
-    data.status.loc[{"mesh_size": 2e-3, "stiffness_ratio": 0.5}] = 4
-    axes = st.plot_sensitivity(data, **CURVE)  # of the group alone
-    stable = drawn(axes, "2 mm").get_ydata()
-    assert np.isnan(stable[0]) and np.isfinite(stable[1:]).all()
-    thin = [line for line in axes.get_lines() if line.get_linewidth() == 0.5 and len(line.get_xdata()) == 5]
-    assert len(thin) == 1 and np.isfinite(thin[0].get_ydata()).tolist() == [True, False, False, False, False]
 
 
 def test_errors_against_mesh_size_are_the_datasets(tree):
@@ -159,15 +123,6 @@ def test_springs_of_a_deformed_network_join_its_moved_particles(tree):
         [x[0], x[1], np.nan, x[1], x[2], np.nan, x[2], x[3], np.nan], nan_ok=True
     )
     assert "mesh 5 mm" in title  # the coarsest, whose springs can be told
-
-
-def test_a_network_that_is_not_solved_says_so(tree):
-    data = tree.copy()
-    fields = data["fields"].to_dataset()
-    data["fields"] = xr.DataTree(fields.assign(displacement_x=np.nan * fields.displacement_x,
-                                               displacement_y=np.nan * fields.displacement_y))  # fmt: skip
-    panel = st.plot_deformed(data, beam="100x20", definition="area", **SCENES)[0]
-    assert [text.get_text() for text in panel.texts] == ["no network stored"]
 
 
 def test_the_pressed_face_is_the_datasets(tree):
@@ -275,25 +230,6 @@ def test_a_refused_plot_names_what_there_is(tree, plot, group, selection, said):
 
 
 # -- the stage ---------------------------------------------------------------------------------------------------------
-
-
-def test_outputs_are_those_that_a_study_may_name():
-    assert all(isinstance(output, Output) and output.meaning for output in outputs().values())
-
-
-def test_the_stage_draws_what_it_is_told(tree, tmp_path):
-    path = tmp_path / "dataset.nc"
-    chosen = {"beam": ["100x20"], "material": ["steel"], "load": ["traction"]}
-    small, curves = tree.to_dataset().sel(chosen), tree["sensitivity"].to_dataset().sel(chosen)
-    root = small.assign_attrs(springtune_version="1")
-    xr.DataTree.from_dict({"/": root, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
-    kinds = [f"size_{name}" for name in ("structured", "free")]
-    kinds += [f"sensitivity_100x20_{name}" for name in ("structured", "free")]
-    stems = [f"{kind}_steel_traction" for kind in kinds]
-    made = present.run(path, tmp_path, "size", "sensitivity")
-    assert made == [tmp_path / f"figures/{stem}.{ending}" for stem in stems for ending in FORMATS]
-    files = sorted(path.name for path in (tmp_path / "figures").iterdir())
-    assert files == sorted(f"{stem}.{ending}" for stem in stems for ending in FORMATS)
 
 
 def test_both_formats_show_the_same_and_are_the_same_again():

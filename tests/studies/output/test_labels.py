@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from matplotlib.text import Text
 from pypdf import PdfReader
 from test_figures import EVERY_PLOT, closed, each  # noqa: F401  # a fixture of that file
@@ -103,13 +102,6 @@ def test_a_figure_is_what_a_journal_takes(tree, plot):
     check_texts(figure, boxes)
 
 
-def test_texts_of_a_pdf_can_be_searched_and_a_rare_character_is_there():
-    figure = Figure(figsize=(3, 2))
-    figure.text(0.1, 0.5, "stiffness √3/2 ж")
-    content = png_and_pdf(figure)["pdf"]
-    assert PdfReader(io.BytesIO(content)).pages[0].extract_text().strip() == "stiffness √3/2 ж"
-
-
 # -- texts -------------------------------------------------------------------------------------------------------------
 
 
@@ -144,14 +136,6 @@ def test_lines_are_told_apart_by_the_colour_blind(sight):
     assert nearest > 10
 
 
-def test_lines_and_markers_are_told_apart_without_colours():
-    looks = [style.line(number) for number in range(3 * len(style.LINES))]
-    for part in ("linestyle", "marker"):
-        first = [str(look[part]) for look in looks[: len(style.LINES)]]
-        assert len(set(first)) == len(first)
-    assert len({(look["color"], look["marker"]) for look in looks}) == len(looks)
-
-
 # -- what is missing ---------------------------------------------------------------------------------------------------
 
 KEPT = ("beam_length", "beam_height", "trapezoid_x", "trapezoid_y", "x", "y", "outline_x", "outline_y", "spring_nodes",
@@ -173,33 +157,8 @@ def nothing(tree):
     return tree.map_over_datasets(lambda group: unsolved(group) if group.data_vars else group)
 
 
-@pytest.fixture(scope="module")
-def one_size(tree):
-    """A study of one mesh size."""
-
-    def cut(group):
-        if "case_mesh_size" in group:
-            group = group.assign(case_mesh_size=0 * group.case_mesh_size + float(tree["shapes"].mesh_size[1]))
-        return group.isel(mesh_size=[1]) if "mesh_size" in group.dims else group
-
-    return tree.map_over_datasets(cut)
-
-
-def says_something(panel):
-    """Whether a panel has marks, cells or words; frames, grids and marks at nothing are none."""
-    lines = [line for line in panel.get_lines() if np.isfinite(np.asarray(line.get_ydata(), dtype=float)).any()]
-    return bool(lines or panel.texts or panel.images or panel.collections or panel.patches)
-
-
 @each
 def test_where_nothing_was_solved_words_say_so(nothing, plot):
     panels = np.ravel(plot(nothing, **EVERY_PLOT[plot][0]))
     # Of a laid strip the trapezoid is there, with a note.
     assert all(any(text.get_text().strip() for text in panel.texts) for panel in panels)
-
-
-@each
-def test_one_mesh_size_is_shown(one_size, plot):
-    selection = EVERY_PLOT[plot][0]
-    for panel in np.ravel(plot(one_size, **selection)):
-        assert says_something(panel)

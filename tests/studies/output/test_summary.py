@@ -15,7 +15,7 @@ from snakemake_logger_plugin_springtune import Display, LogHandler
 from springtune.problem.status import Status
 from springtune.safe_io import atomic
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import rerun
 
@@ -90,14 +90,6 @@ class TestText:
         assert "beyond small strain, so the error is not the network's alone: 3 of 5" in text
         assert "100x20, steel, traction: it turns by 1 rad" in text and "worst" not in text
 
-    def test_other_groups_are_counted_where_messages_are_of_their_cells(self, root):
-        row = cell() | {"best_stiffness_status": Status.FAILED, "best_stiffness_message": "no minimum"}
-        curves = SENSITIVITY.of_rows(AXES, [row])
-        lines = summing_up.text({"/": root, "/sensitivity": curves}, "A study").splitlines()
-        assert "  sensitivity, best stiffness  1  1 failed" in lines
-        assert "  100x20, free, 1 mm, steel, traction, linear: no minimum" in lines
-        assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes; 1 of 1 sensitivity, best stiffness.")
-
     def test_a_few_are_named_of_many_and_of_each_reason_one_first(self):
         beams = [f"beam-{letter}" for letter in "abcdefghij"]
         whys = [*(f"residual {number}.5e-3" for number in range(9)), "refused"]
@@ -118,15 +110,6 @@ def planned(tmp_path):
     study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
     made = rerun.jobs(study, folder)
     return study, made, [name for name, job in made.items() if job.stage]
-
-
-def test_outputs_without_files_have_no_job(planned, tmp_path):
-    (tmp_path / "none.yaml").write_text(STUDY.replace("[lattice, patch]}", "lattice, sensitivity: false}"))
-    study = load_study(tmp_path / "none.yaml")
-    assert "sensitivity" in study.outputs
-    found = rerun.jobs(study, tmp_path / "results/none")
-    assert all(job.products for name, job in found.items() if name.startswith(rerun.PRESENT))
-    assert not any("sensitivity" in name for name in found if name.startswith(rerun.PRESENT))
 
 
 def mark_done(made, name, computed, moment):
@@ -175,12 +158,6 @@ class TestEnding:
         assert "logs/collect.log" in summary.broken(study, made, since)
         besides = summary.beside(study, made, since)
         assert "new in two: " in besides and f"not complete: {names[-1]}" in besides and besides.count(".log") == 2
-
-    def test_a_run_with_nothing_to_do_reminds_of_holes(self, tmp_path):
-        assert summary.reminder(tmp_path) == ""
-        (tmp_path / rerun.SUMMARY).write_text("A study\n\nNot everything is solved: 1 of 2 scenes.\n")
-        lines = summary.reminder(tmp_path).splitlines()
-        assert lines[0] == "Not everything is solved: 1 of 2 scenes." and f"{rerun.SUMMARY} has the reasons" in lines[1]
 
 
 class Terminal(io.StringIO):
@@ -271,21 +248,6 @@ class TestHandler(TestLogHandlerBase):
         made = io.StringIO()
         emit_run(handler(monkeypatch, made, **{setting: value}))
         assert made.getvalue().count("Select jobs to execute...") == 3
-
-    def test_what_starts_no_run_is_as_without_a_plugin(self, monkeypatch):
-        made = io.StringIO()
-        shown = handler(monkeypatch, made)
-        for message in ("Building DAG of jobs...", "Nothing to be done"):
-            shown.emit(record(message))
-        shown.close()
-        assert made.getvalue() == "Building DAG of jobs...\nNothing to be done\n"
-
-    def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
-        made = io.StringIO()
-        shown = handler(monkeypatch, made)
-        shown.emit(record("Job stats:", event=LogEvent.RUN_INFO, stats={"total": 1}))
-        shown.emit(record("still told", event=LogEvent.JOB_FINISHED))
-        assert "still told" in made.getvalue()
 
 
 def test_what_is_left_follows_the_rate_so_far():

@@ -222,16 +222,6 @@ def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
     assert "alu-bar, 120 x 25 x 2 mm" in html
 
 
-def test_the_page_says_once_what_a_sign_means(tmp_path):
-    tree = scenes()
-    tables_page.write(tree, tmp_path)
-    assert (tmp_path / "index.html").read_text().count("|reference|; positive: too soft. The reference") == 1
-    tree["reference_displacement"].loc[{"load": "compression"}] *= -1
-    tables_page.write(tree, tmp_path)
-    said = "; positive: too soft; under compression, where displacements are negative, negative is too soft."
-    assert (tmp_path / "index.html").read_text().count(said) == 1
-
-
 def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_path):
     tables_page.write(scenes(), tmp_path)
     html, _ = lines_of(tmp_path)
@@ -256,7 +246,3 @@ def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_pat
 def test_a_column_has_the_decimals_that_its_numbers_need(values, texts):
     places = decimals(values)
     assert [number(value, places) for value in values] == texts
-
-
-def test_a_number_that_is_nothing_has_no_sign():
-    assert number(-0.001, 2, sign=True) == "0.00" and number(0.5, 1, sign=True) == "+0.5"

@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -111,32 +110,6 @@ def test_what_is_wrong_with_a_number_is_told_with_its_name(datasets, entry, told
     with pytest.raises(PaperError, match="^it: ") as error:
         number(datasets, **entry)
     assert re.search(told, str(error.value)), error.value
-
-
-def test_values_of_mixed_kinds_are_shown_in_the_units_of_those_that_are_chosen(tmp_path):
-    data = xr.Dataset(
-        {
-            "value": ("quantity", [0.024, 92.7e6, np.nan], {"units": "1", "units_variable": "quantity_units"}),
-            "quantity_units": ("quantity", ["m", "Pa", ""]),
-        },
-        {"quantity": ["tip", "stress", "nothing"]},
-    )
-    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs=ATTRIBUTES), "/mixed": data})
-    tree.to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
-    there = read([tmp_path / "mine.nc"])
-    for entry, text, *told in ROWS["mixed"]:
-        with pytest.raises(PaperError, match=told[0]) if told else nullcontext():
-            assert number(there, variable="mixed/value", digits=1, **entry) == text
-
-
-def test_an_optional_number_may_lack_and_so_does_what_is_made_of_it(datasets):
-    lacking = {"study": "mine", "variable": "deformation_error", "at": HOLE, "optional": True}
-    found = numbers(
-        {"a": lacking, "b": {"formula": "2 * a", "optional": True}, "c": lacking | {"at": CELL | {"beam": "1x1"}}},
-        {},
-        datasets,
-    )
-    assert [found[name]["text"] for name in "abc"] == [None, None, None]
 
 
 def test_a_table_is_the_product_of_rows_and_columns(datasets):
@@ -254,28 +227,8 @@ def test_an_example_draws_a_figure_of_the_paper_and_what_is_wrong_with_one_is_to
             drawn(declared)
 
 
-def test_without_typst_the_message_says_what_to_install(tmp_path, path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "typst", None)
-    with pytest.raises(
-        PaperError, match=re.escape("in a clone `pip install '.[paper]'`, of a wheel `pip install 'springtune-")
-    ):
-        run(paper(tmp_path / "source"), tmp_path / "build", tmp_path / "paper.pdf", path)
-
-
 def test_a_dataset_that_is_not_there_is_told(tmp_path):
     with pytest.raises(PaperError, match=r"lost.nc: there is no such dataset"):
         run(paper(tmp_path / "source"), tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "lost.nc")
     with pytest.raises(PaperError, match=r"main.typ: there is no such file"):
         run(tmp_path / "nowhere", tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "lost.nc")
-
-
-def test_every_reference_says_what_was_read():
-    references = yaml.safe_load((PAPER / "references.yml").read_text())
-    text = (PAPER / "main.typ").read_text()
-    cited = set(re.findall(r"@([\w-]+)", text)) - set(re.findall(r"<([\w-]+)>", text))
-    assert cited == set(references)
-    for name, one in references.items():
-        assert re.search(r"\bread\b|software", one["note"]), name
-        assert name == "original" or one["author"], name
-        doi = one.get("serial-number", {}).get("doi")
-        assert doi is None or re.fullmatch(r"10\.\d{4,}/\S+", doi), name

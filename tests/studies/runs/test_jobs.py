@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import sys
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -15,11 +14,8 @@ import pytest
 from springtune.studies.kinds.bodies.plan import OF_OTHERS
 from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
-from springtune.studies.runs.source import STATE, hash_of, source_state
+from springtune.studies.runs.source import hash_of
 from springtune.studies.runs.store import DamagedError
-
-from campaigns import Campaign
-from tables import STUDIES
 
 RESULTS = {
     "one": {"displacement": 1.25e-3, "message": "µ", "iterations": 3, "field": np.arange(30.0).reshape(10, 3)},
@@ -148,28 +144,6 @@ def test_a_broken_program_ends_the_job_when_the_others_are_done(stage, error):
     with pytest.raises(SystemExit, match="1 of this job's tasks could not be done"):
         run()
     assert read().keys() == {"a2", "b1", "b2"} and not (folder / "done").exists()
-
-
-def test_a_job_that_no_run_has_noted_plans_its_study(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("small.yaml").write_text(STUDIES["survival"])
-    campaign = Campaign("small.yaml")
-    campaign.do("mesh_0")
-    assert campaign.jobs["mesh_0"].record.exists() and campaign.jobs["solve_0"].tasks.exists()
-    Path("small.yaml").write_text(STUDIES["survival"].replace("5 mm", "6 mm"))
-    campaign.jobs["mesh_0"].tasks.unlink()
-    with pytest.raises(SystemExit, match="small.yaml was changed while it ran; call the same command again"):
-        campaign.do("mesh_0")
-
-
-def test_an_edit_of_the_program_during_a_run_ends_its_jobs(stage, monkeypatch):
-    """Results would be stored under keys of the code of before."""
-    acts, run, read, _ = stage
-    monkeypatch.setenv(STATE, source_state())
-    run()
-    monkeypatch.setenv(STATE, "that of before")
-    with pytest.raises(SystemExit, match="was edited while the study ran; call the same command again"):
-        run()
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------

@@ -36,16 +36,6 @@ def test_every_change_of_code_is_in_a_digest(change):
 # -- imports -----------------------------------------------------------------------------------------------------------
 
 
-def test_a_closure_is_all_that_is_imported_and_what_only_others_import_is_not_in_it():
-    names = {path.relative_to(keys.PACKAGE).as_posix() for path in keys.closure("springs.lattice").files}
-    assert {"springs/lattice.py", "springs/base.py", "mesh/cells.py"} <= names
-    assert not {name for name in names if name.startswith(("studies/", "reference/", "mesh/free"))}
-    whole = keys.closure("studies.kinds.bodies.reference")
-    less = keys.closure("studies.kinds.bodies.reference", without=("reference.finite_strain",))
-    gone = {path.name for path in whole.files - less.files}
-    assert "finite_strain.py" in gone and whole.digest != less.digest
-
-
 def test_no_module_imports_a_package_that_brings_in_others():
     faces = [f"{keys.PACKAGE.name}.{name}" for name in ("mesh", "springs")]
     assert not any(keys.imports_graph().find_modules_that_directly_import(face) for face in faces)
@@ -118,25 +108,6 @@ def test_a_packages_version_is_in_the_keys_of_what_it_computes(package, known, m
     monkeypatch.undo()
     forget()
     assert {name for name in known if after[name] != known[name]} == VERSIONS[package]
-
-
-def test_an_extra_that_is_not_there_or_not_wanted_is_none(monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setenv("SPRINGTUNE_SOLVER", "superlu")
-        unwanted = _keys()
-    with monkeypatch.context() as patch:
-        version = importlib.metadata.version
-
-        def absent(name):
-            if name == "cvxopt":
-                raise importlib.metadata.PackageNotFoundError(name)
-            return version(name)
-
-        patch.setattr(importlib.metadata, "version", absent)
-        patch.setattr(importlib.metadata, "packages_distributions", dict)
-        missing = _keys()
-    forget()
-    assert unwanted == missing
 
 
 # -- definitions of one's own ------------------------------------------------------------------------------------------

@@ -76,20 +76,6 @@ class TestClaims:
         Path("w/mine.yaml").replace("config/mine.yaml")
         locks.check_claim(STUDY, Path("config/mine.yaml"))
 
-    def test_a_folder_that_was_moved_with_its_config_knows_it(self, tmp_path, monkeypatch):
-        (tmp_path / "moved").mkdir()
-        for name in ("results", "w", "config"):
-            Path(name).rename(tmp_path / "moved" / name)
-        monkeypatch.chdir(tmp_path / "moved")
-        locks.check_claim(STUDY, Path("w/mine.yaml"))
-        with pytest.raises(locks.LockedError):
-            locks.check_claim(STUDY, Path("config/mine.yaml"))
-
-    @pytest.mark.parametrize("spoil", [Path.unlink, lambda path: path.write_text("cut")], ids=["missing", "damaged"])
-    def test_a_folder_without_a_note_is_of_any_study_of_its_name(self, spoil):
-        spoil(STUDY / "tasks/study.json")
-        locks.check_claim(STUDY, Path("config/mine.yaml"))
-
     def test_commands_know_the_study_of_a_folder(self):
         (STUDY / "dataset.nc").touch()
         Path("config/mine.yaml").write_text(SMALL)
