@@ -62,8 +62,7 @@ STUDY_EXAMPLE = "config/shapes.yaml:cook"
 MEANINGLESS_BESIDE = {
     "study": ("beam", "thickness", "mesh", "unit", "young", "poisson", "plane", "force"),
     "material": ("young", "poisson"),
-    "error": ("size", "best_springs", "engine"),
-    "engine": ("best_springs",),
+    "error": ("size", "engine"),
 }
 """Options that another one stands in for: it has, or finds, what they say."""
 

@@ -60,7 +60,6 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
     "[default: traction,bending,shear; after the first with --engine all]",
 )
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
-@click.option("--best-springs", is_flag=True, help="Also search for the best springs on the mesh, for some seconds.")
 @add_options(ENGINE_OPTIONS)
 @click.option(
     "--write",
@@ -73,7 +72,6 @@ def predict(
     error: str | None,
     load: str | None,
     springs_alone: bool,
-    best_springs: bool,
     target: Path | None,
     **engine: Any,
 ) -> None:
@@ -97,7 +95,7 @@ def predict(
     else:
         body = asked(sheet, load, sized=error is None)
         if error is None:
-            text, make = _on_mesh(body, _under(body, names), springs_alone, ("best-springs",) * best_springs)
+            text, make = _on_mesh(body, _under(body, names), springs_alone)
         else:
             text, make = _on_meshes(body, _under(body, names), springs_alone, error, sheet["mesh"])
     click.echo(text)
@@ -129,26 +127,17 @@ def _subject(body: Asked, known: Any) -> "Subject":
     return beam_subject(body.body, body.material, known) if body.is_beam else shape_subject(_statement(body), known)
 
 
-def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> Answer:
+def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool) -> Answer:
     """Best definition for one mesh."""
-    from ..mesh.types import MESH_TYPES
-    from ..prediction.choices import SEARCHED_PARTICLES, SOLVED_PARTICLES, predict, references, shape_references
+    from ..prediction.choices import SOLVED_PARTICLES, predict, references, shape_references
     from .recommendation import prediction_text, recommended
 
-    most, count, mesh = SEARCHED_PARTICLES if also else SOLVED_PARTICLES, 0.0, None
-    if body.is_beam and body.size is not None:  # counted before it is made
-        count = MESH_TYPES[body.mesh_type].particles(body.body.length, body.body.height, body.size)
-    if count <= most:
-        mesh = body.mesh if body.is_beam else body.mesh.mesh
-        count = len(mesh.points)
-    if mesh is None or count > most:
-        raise click.ClickException(
-            f"'{body.mesh_name}' has {count:.0f} particles, more than the {most} that are solved here"
-            f"{' with --best-springs' * bool(also)}; "
-            "give a coarser mesh, or make it a mesh of a study"
-        )
+    mesh = body.mesh if body.is_beam else body.mesh.mesh
+    if len(mesh.points) > SOLVED_PARTICLES:
+        why = f"has {len(mesh.points)} particles, more than the {SOLVED_PARTICLES} that are solved here"
+        raise click.ClickException(f"'{body.mesh_name}' {why}; give a coarser mesh, or make it a mesh of a study")
     known: Any = references(body.body, body.material, **under) if body.is_beam else shape_references(_statement(body))
-    found = predict(body.body, body.mesh, body.material, known, **under, also=also)
+    found = predict(body.body, body.mesh, body.material, known, **under)
     counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
     found = [choice for choice in found if not (springs_alone and choice.energies)]
     best, _ = recommended(found)

@@ -12,6 +12,7 @@ from springtune.problem.materials import INCOMPRESSIBLE
 from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from springtune.problem.quantities import nearest
 from springtune.springs.base import DEFINITIONS
+from springtune.springs.lattice import COEFFICIENT
 
 from .combinations import SAME_VALUE, factors
 from .messages import Key, Problems, part_of, show
