@@ -217,7 +217,7 @@ def write_med(path):
 
 
 def write_refs(path, key):
-    """Numbers of groups as `meshio convert` keeps those of other formats."""
+    """Numbers of groups as other formats have them."""
     cells = [("line", np.concatenate([RIGHT, LEFT]) - 1), ("quad", QUADS - 1), ("triangle", TRIANGLES - 1)]
     tags = [np.array([101, 101, 102, 102]), np.where(HARD[4], 201, 202), np.where(HARD[3], 201, 202)]
     meshio.Mesh(np.column_stack([POINTS, 0 * POINTS[:, 0]]), cells, cell_data={key: tags}).write(path)
@@ -227,7 +227,8 @@ WRITTEN = {
     "marks.vtu": write_clean,
     "version.vtu": write_newer,
     "plate.med": write_med,
-    "numbers.vtu": lambda path: write_refs(path, "medit:ref"),
+    "numbers.mesh": lambda path: write_refs(path, "medit:ref"),
+    "numbers.avs": lambda path: write_refs(path, "avsucd:material"),
 }
 
 TEXTS = {

@@ -295,6 +295,9 @@ COUNTS = {
     "gmsh, text": ("msh", {"binary": False}, b"$Nodes\n1 %d", b"$Nodes\n1 4000000000"),
     "gmsh22": ("msh", {}, b"$Nodes\n%d\n", b"$Nodes\n4000000000\n"),
     "gmsh22, text": ("msh", {"binary": False}, b"$Nodes\n%d\n", b"$Nodes\n4000000000\n"),
+    "vtk51": ("vtk", {}, b"POINTS %d", b"POINTS 4000000000"),
+    "ply": ("ply", {"binary": False}, b"vertex %d", b"vertex 4000000000"),
+    "medit": ("mesh", {}, b"Vertices\n%d", b"Vertices\n4000000000"),
 }
 
 

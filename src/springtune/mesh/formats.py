@@ -1,4 +1,4 @@
-"""Mesh files: Gmsh's 4.1 and Abaqus' by readers of their own, Gmsh's 2.2, MED and VTU by meshio.
+"""Mesh files: Gmsh's 4.1 and Abaqus' by readers of their own, all others by meshio.
 
 Groups are Gmsh's physical groups, sets of Abaqus and others, and marks in VTU.
 """
@@ -36,8 +36,15 @@ FAMILIES = ("cell_tags", "point_tags")
 COPIED = ("vtkGhostType", "vtkGhostLevels")
 """Data in which what belongs to other files is not 0."""
 
-ENDINGS = (".msh", ".inp", ".med", ".vtu")
-"""Endings of the files that are read."""
+NOT_READ = {
+    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), IN_OTHER_FILES),
+    **dict.fromkeys((".bdf", ".nas", ".fem"), "is of Nastran, which is not read; export it as .msh, .inp or .vtu"),
+    **dict.fromkeys((".e", ".exo", ".ex2"), "is of Exodus, which is not read; export it as .msh, .inp or .vtu"),
+}
+"""Why files are refused by their ending: meshio would miss parts of them, or their groups."""
+
+HDF5 = b"\x89HDF\r\n"
+"""What files of HDF5 begin with, some after a block of their own."""
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
@@ -102,7 +109,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """Read a mesh of Gmsh, Abaqus, MED or VTU.
+    """Read a mesh of any format that meshio reads.
 
     Particles without cells are dropped, clockwise cells are turned.
 
@@ -154,9 +161,10 @@ def _file_content(path: str | Path) -> Content:
     if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     size, ending = Path(path).stat().st_size, Path(path).suffix.lower()
-    if ending not in ENDINGS:
-        remedy = f"convert it, by 'meshio convert {Path(path).name} {Path(path).stem}.vtu', say"
-        raise MeshError(f"{path}: unknown format '{ending}': {', '.join(ENDINGS)} are read; {remedy}")
+    if ending in NOT_READ:
+        raise MeshError(f"{path}: {NOT_READ[ending]}")
+    if ending not in library().extension_to_filetypes:
+        raise MeshError(f"{path}: unknown format '{ending}'; convert it to .vtu or .msh")
     if size == 0:
         raise MeshError(f"{path}: the file is empty; write the mesh again")
     if size > LARGEST_FILE:
@@ -185,12 +193,11 @@ def _read(path: str | Path, ending: str) -> Content:
         return abaqus.read(raw)
     if ending == ".vtu":
         return _read_vtu(raw)
-    if ending == ".med":
+    if ending == ".msh" and raw.lstrip()[:1] == b"$":  # others are of Ansys
+        return gmsh.read(raw) or gmsh.check_once(_by_meshio(library().read(path)))
+    if HDF5 in raw:
         check_alone(path)
-    elif content := gmsh.read(raw):
-        return content
-    content = _by_meshio(library().read(path))
-    return gmsh.check_once(content) if ending == ".msh" else content
+    return _by_meshio(library().read(path))
 
 
 def _read_vtu(raw: bytes) -> Content:
@@ -316,7 +323,7 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
 
 
 def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
-    """Read a mesh with its groups, of Gmsh, Abaqus, MED or VTU.
+    """Read a mesh with its groups, of any format that meshio reads.
 
     Groups are physical groups of Gmsh (by number if unnamed), sets of Abaqus, groups of MED, and
     named arrays of zeros and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline,

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 import platform
 import subprocess
 from datetime import UTC, datetime
@@ -63,8 +62,12 @@ def _plugins(study: Study) -> set[str]:
 
 
 def inputs(study: Study) -> dict[str, str]:
-    """SHA-256 of each input file, by its path from the study's folder."""
-    return {Path(os.path.relpath(file, study.path.parent)).as_posix(): checksum(file) for file in input_files(study)}
+    """SHA-256 of each input file, by its path in the study's folder; of others only the last folder is named."""
+    folder, found = study.path.parent.resolve(), {}
+    for file in map(Path.resolve, input_files(study)):
+        inside = file.is_relative_to(folder)
+        found[file.relative_to(folder).as_posix() if inside else f"{file.parent.name}/{file.name}"] = checksum(file)
+    return found
 
 
 def input_files(study: Study) -> list[Path]:
