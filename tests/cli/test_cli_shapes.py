@@ -156,7 +156,7 @@ def test_refusals_are_one_line(arguments, message, here):
     assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
 
 
-@pytest.mark.parametrize("ending", [".xml", ".scn", ".xpbd.json"])
+@pytest.mark.parametrize("ending", [".xml", ".py", ".xpbd.json"])
 def test_follower_pressure_is_refused_by_simulators(ending, here, tmp_path):
     asked = ("--study", "study.yaml:plate", "--load", "push", "--size", "4 mm", "--definition", "lattice")
     result = run("springs", *asked, "--out", tmp_path / f"net{ending}")

@@ -2,7 +2,6 @@
 
 import json
 import re
-import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -30,7 +29,6 @@ OLD = mujoco.__version__.startswith("3.")
 PROGRAMS = {
     ".xml": "MuJoCo",
     ".mjcf": "MuJoCo",
-    ".scn": "SOFA",
     ".py": "SOFA",
     ".newton.py": "Newton",
     ".xpbd.json": "XPBD",
@@ -221,7 +219,7 @@ def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
     mujoco.mj_forward(model, data)
     assert model.nu == 0 and model.nq == 2 * len(net.points) and not model.dof_damping.any()
     assert np.abs(data.qfrc_passive).max() < 1e-9 * net.stiffness.max() * net.rest_lengths.max()
-    sofa = as_sofa_reads((tmp_path / "net.scn").read_text())
+    sofa = as_sofa_reads((tmp_path / "net.py").read_text())
     assert "ConstantForceField" not in sofa and len(sofa["MechanicalObject"]) == 1
     constraints = json.loads((tmp_path / "net.xpbd.json").read_text())
     assert constraints["mass_damping"] == 0 and constraints["displacements"] is None
@@ -293,7 +291,7 @@ def test_springs_of_no_and_of_negative_stiffness(tmp_path):
     model, data = loaded(one, tmp_path)
     assert model.ntendon == len(one.springs.relative) - 2 + 1
     assert out_of_balance(model, data, one.solve().displacements[~one.network.held]) < 1e-9
-    ET.fromstring(written(one, tmp_path, ".scn"))
+    as_sofa_reads(written(one, tmp_path, ".py"))
     with pytest.raises(ValueError, match=r"1 of \d+ springs have a negative stiffness, and no compliance of XPBD is"):
         one.springs.write(tmp_path / "net.xpbd.json", errors=False)
 
@@ -302,10 +300,30 @@ def test_springs_of_no_and_of_negative_stiffness(tmp_path):
 
 
 def as_sofa_reads(text):
-    """Components of a scene by their class, their data as texts, as SOFA's XML reader has them."""
+    """Components that a scene in Python adds, by their class; its nodes are stood in for."""
     found = {}
-    for tag in ET.fromstring(text).iter():
-        found.setdefault(tag.tag, []).append(dict(tag.attrib))
+
+    class Node:
+        """What a scene does to a node of SofaPython3."""
+
+        class Value:
+            value = None
+
+        def __init__(self):
+            self.dt, self.gravity = Node.Value(), Node.Value()
+
+        def addObject(self, name, /, **data):
+            if name == "EulerImplicitIntegrationScheme":
+                raise ValueError("not before v26.06")
+            found.setdefault(name, []).append(data)
+
+        def addChild(self, name):
+            return Node()
+
+    names, root = {}, Node()
+    exec(compile(text, "net.py", "exec"), names)
+    names["createScene"](root)
+    assert root.dt.value > 0 and root.gravity.value == [0, 0, 0]
     return found
 
 
@@ -331,7 +349,7 @@ def held_and_loaded(found, count):
 def test_sofa_reads_each_spring_with_its_own_stiffness(mesh_type, load, definition, tmp_path):
     one = scene(mesh_type, load, definition)
     result, network = one.solve(), one.network
-    found = as_sofa_reads(written(one, tmp_path, ".scn"))
+    found = as_sofa_reads(written(one, tmp_path, ".py"))
     # LinearSpring's operator >>: two particles, stiffness, damping, rest length, one spring after the other.
     rows = np.array(found["SpringForceField"][0]["spring"].split(), dtype=float).reshape(-1, 5)
     assert np.array_equal(rows[:, :2], one.mesh.edges)
@@ -350,6 +368,15 @@ def test_sofa_reads_each_spring_with_its_own_stiffness(mesh_type, load, definiti
     total = pulls(particles, rows[:, :2].astype(int), rows[:, 2], rows[:, 4], moved) + forces
     assert np.linalg.norm(total[~held]) < 1e-9 * np.linalg.norm(forces)
     assert np.allclose(predicted, moved, rtol=0, atol=1e-8 * np.abs(result.displacements).max())
+
+
+def test_sofas_scene_in_python_serves_versions_with_other_names(tmp_path):
+    """Since v26.06 the integrator is another component of another plugin."""
+    text = written(scene(), tmp_path, ".py")
+    swapped = text.replace("EulerImplicitSolver", "?").replace("EulerImplicitIntegrationScheme", "EulerImplicitSolver")
+    found = as_sofa_reads(swapped.replace("?", "EulerImplicitIntegrationScheme"))
+    assert "EulerImplicitSolver" in found
+    assert {"pluginName": "Sofa.Component.IntegrationScheme.Backward"} in found["RequiredPlugin"]
 
 
 # -- XPBD --------------------------------------------------------------------------------------------------------------
@@ -410,7 +437,7 @@ def test_a_load_without_equilibrium_or_with_one_far_away_is_written_and_says_so(
     with pytest.warns(EquilibriumWarning):
         assert json.loads(written(one, tmp_path, ".xpbd.json"))["displacements"] is None
     with pytest.warns(EquilibriumWarning):
-        assert 'name="predicted"' not in written(one, tmp_path, ".scn")
+        assert "PREDICTED = []" in written(one, tmp_path, ".py")
 
 
 # -- shapes ------------------------------------------------------------------------------------------------------------
@@ -489,7 +516,7 @@ def test_files_of_shapes_balance_by_what_they_hold_alone(load, tmp_path):
     """Supports, forces and springs of files for SOFA and XPBD, and of plain arrays."""
     one = holed(load, "patch")
     moved = one.solve().displacements
-    sofa = as_sofa_reads(written(one, tmp_path, ".scn"))
+    sofa = as_sofa_reads(written(one, tmp_path, ".py"))
     rows = np.array(sofa["SpringForceField"][0]["spring"].split(), dtype=float).reshape(-1, 5)
     held, forces = held_and_loaded(sofa, len(moved))
     found = {"SOFA": (rows[:, :2].astype(int), rows[:, 2], rows[:, 4], held[:, :2], forces[:, :2])}

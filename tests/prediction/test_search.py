@@ -45,7 +45,7 @@ class TestWhatIsFound:
         """The error is kept on the mesh and on all finer ones tried; on the next coarser one tried it is not."""
         assert len(found_in(search)) >= len(TYPES)
         for one in found_in(search):
-            assert one.confirmed and one.finer[-1].cells >= 2 * one.cells
+            assert one.finer[-1].cells >= 2 * one.cells
             assert worst(BEAM, STEEL, one, one.size, search.loads) == pytest.approx(one.choice.worst, rel=1e-9)
             for size in (one.size, *(finer.size for finer in one.finer)):
                 assert worst(BEAM, STEEL, one, size, search.loads) <= 0.05
@@ -83,7 +83,6 @@ class TestWhatIsFound:
         for one in found_in(search):
             mesh = st.make_mesh(BEAM, one.mesh_type, one.size)
             assert (len(mesh.points), len(mesh.edges)) == (one.particles, one.springs)
-            assert 0 < one.seconds
             # Supports take away directions, and frequencies with them.
             scene = st.Scene(BEAM, mesh, STEEL, "traction", 1.0, definition=one.choice.definition, kinematics="linear")
             assert one.step_limit <= scene.motion().step_limit("central-difference") * (1 + 1e-6)
@@ -114,11 +113,10 @@ class TestRandomSearches:
         error, mesh_type = random.choice([0.02, 0.05, 0.1]), str(random.choice(list(st.MESH_TYPES)))
         search = find_mesh(beam, material, float(error), loads=loads, mesh_types=[mesh_type], most=most)
         for one in found_in(search):
-            if one.confirmed:
-                assert worst(beam, material, one, one.size, loads) <= error
-                cells = random.integers(one.cells + 1, 2 * one.cells + 1)
-                half = one.size * one.cells / cells
-                yield worst(beam, material, one, half, loads) / error
+            assert worst(beam, material, one, one.size, loads) <= error
+            cells = random.integers(one.cells + 1, 2 * one.cells + 1)
+            half = one.size * one.cells / cells
+            yield worst(beam, material, one, half, loads) / error
 
     def test_meshes_in_between_keep_it_too(self):
         random = np.random.default_rng(8)
@@ -146,12 +144,11 @@ class TestBetweenWholeDivisions:
         beam, nu, error, loads, mesh_type = QUESTIONS[question]
         material = st.Material("210 GPa", nu)
         search = find_mesh(beam, material, error, loads=loads, mesh_types=[mesh_type], most=2000)
-        assert search.best.confirmed
+        assert search.best
         for one in found_in(search):
-            if one.confirmed:
-                # Those that are promised, and twelve others.
-                for part in (*FINER, *np.random.default_rng(5).uniform(0.5, 1, 12)):
-                    assert worst(beam, material, one, one.size * part, loads) <= asked_error(error), part
+            # Those that are promised, and twelve others.
+            for part in (*FINER, *np.random.default_rng(5).uniform(0.5, 1, 12)):
+                assert worst(beam, material, one, one.size * part, loads) <= asked_error(error), part
 
     @pytest.mark.slow
     def test_random_questions(self):
@@ -164,9 +161,8 @@ class TestBetweenWholeDivisions:
             error, types = float(random.choice([0.005, 0.01, 0.02, 0.05])), list(random.permutation([*st.MESH_TYPES]))
             search = find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
             for one in found_in(search):
-                if one.confirmed:
-                    sizes = one.size * random.uniform(0.5, 1, 12)
-                    broken.append(max(worst(beam, material, one, size, loads) for size in sizes) > error)
+                sizes = one.size * random.uniform(0.5, 1, 12)
+                broken.append(max(worst(beam, material, one, size, loads) for size in sizes) > error)
         assert len(broken) >= 20 and np.mean(broken) <= 0.05
 
     def test_they_are_told(self, search):
@@ -181,7 +177,7 @@ class TestBetweenWholeDivisions:
         plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pulled("4 kN", 0)})
         search = find_mesh(plate, STEEL, "2 %")
         one, known = search.best, search.known["end"].value
-        assert one.confirmed and any(finer.cells != int(finer.cells) for finer in one.finer)
+        assert any(finer.cells != int(finer.cells) for finer in one.finer)
         for part in FINER[::2]:
             mesh, definition = st.mesh_shape(plate, one.size * part), one.choice.definition
             scene = st.Scene(plate, mesh, STEEL, "pull", definition=definition, kinematics="linear")
@@ -216,8 +212,7 @@ class TestWhatIsNotFound:
     def test_too_few_finer_ones_are_said(self):
         """Nine cells across are 460 particles; eighteen would be 1,700."""
         search = find_mesh(BEAM, STEEL, "5 %", mesh_types=["right"], most=700)
-        assert not search.best.confirmed and search.best.choice.worst <= 0.05
-        assert search.best.finer and all(one.worst(search.best.choice.definition) <= 0.05 for one in search.best.finer)
+        assert search.best is None and min(one.worst(name) for one in search.tried for name in one.errors) <= 0.05
 
     def test_what_tends_to_another_error_is_given_up(self):
         """Squares with one diagonal and springs alone have nu = 0, whatever their size: some 11 % off in shear."""

@@ -176,7 +176,6 @@ def test_a_field_tells_regions_and_rigid_motion_does_not_matter(tmp_path):
     assert low < 9e9 < high and high < 2 * low
     within(found, **{"E main": 2e9, "nu": 0.3})
     assert found.materials["core"].young_modulus == found.values["E core"]
-    assert st.identify(st.MeasuredTest(CORE, "pull", file, noise="1 nm"), "regions").notes[-1].endswith("does not fit")
     with pytest.raises(ValueError, match="take 'regions'"):
         st.identify(st.MeasuredTest(CORE, "pull", file))
 
@@ -219,7 +218,7 @@ def test_points_without_numbers_are_left_out(tmp_path, cell):
 NOT_AS_STATED = {
     "v runs down": (SHEET, "traction", lambda _, moved, __: moved * [1, -1], "change the sign of v"),
     "v of shear": (SHEET, "shear", lambda _, moved, __: moved * [1, -1], "does not fit"),
-    "windows": (SHEET, "traction", windows, "correlated over some"),
+    "windows": (SHEET, "traction", windows, "residuals are not random, so the intervals are too narrow"),
     "isotropic law": (PLY, "shear", lambda _, moved, __: moved, "the law does not fit"),
     "angle": (PLY.rotated(0.3), "traction", lambda _, moved, __: moved, "the law does not fit"),
 }
@@ -231,8 +230,6 @@ def test_what_does_not_fit_is_noted(tmp_path, kind):
     file = beam_field(tmp_path / "f.csv", material, load, spoil)
     found = st.identify(st.MeasuredTest(BEAM, load, file, force=500), "orthotropic" if kind == "angle" else "isotropic")
     assert re.search(note, " ".join(found.notes))
-    if kind == "windows":
-        within(found, E=3e9, nu=0.35)
 
 
 @pytest.mark.parametrize(

@@ -189,7 +189,7 @@ class TestEquilibrium:
     def test_of_forces_and_moments(self, kinematics):
         grouped = st.mesh_shape(self.shape, 4e-3)
         scene = st.Scene(self.shape, grouped, self.soft, "pull", definition="delingette", kinematics=kinematics)
-        solution = scene.statement.solve(scene.sheet, scene.springs)
+        solution = scene.statement.solve(scene.springs)
         assert solution.message == ""
         moved = solution.equilibrium.displacements
         acting = scene.forces

@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
 
-TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "noise", "shift", "file")
+TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
 
 
 @click.command(
     epilog=examples(
         "springtune identify pull.csv --beam 100x20 --load traction",
-        'springtune identify dic.csv --beam 100x20 --load traction --force "400 N" --noise "1 um"',
+        'springtune identify dic.csv --beam 100x20 --load traction --force "400 N"',
         "springtune identify tests.yaml --law orthotropic",
     )
 )
@@ -32,7 +32,6 @@ TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "noise", "s
 @click.option("--load", help="Load of the beam, or load case of the shape: what is held and which side is loaded.")
 @click.option("--force", help="Force on a beam at which a field was measured, such as '400 N'.")
 @click.option("--angle", default="0 deg", help="Angle of the material's first axis from x.")
-@click.option("--noise", help="Noise of the displacements, such as '1 um'; estimated without.")
 @click.option("--shift/--no-shift", default=True, help="Remove the rigid motion of fields, and the zero of curves.")
 def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **options: Any) -> None:
     """Find a material's constants from measured tests of a sheet, with 95 % intervals.

@@ -46,8 +46,7 @@ def check_target(option: str, target: Path) -> None:
 
 
 SPRING_FILES = (
-    ".csv, .json, .vtu (ParaView), .xml or .mjcf (MuJoCo), .scn or .py (SOFA), .newton.py (Newton), "
-    "or .xpbd.json (XPBD)"
+    ".csv, .json, .vtu (ParaView), .xml or .mjcf (MuJoCo), .py (SOFA), .newton.py (Newton), or .xpbd.json (XPBD)"
 )
 """Endings of files of springs, for the help."""
 

@@ -189,11 +189,10 @@ def _in_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str],
     if body.load is None:
         raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
     make = partial(Scene, body.body, body.mesh, body.material, body.load, options["force"], scale=options["scale"])
-    if options["definition"] is not None:
-        scene: Scene | None = make(definition=options["definition"])
-        refused, tried = "", tuple[str, ...]()
-    else:
+    if options["definition"] is None:
         scene, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
+    else:
+        scene, refused, tried = make(definition=options["definition"]), "", ()
     if scene is None:
         raise click.ClickException(refused)
     fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)

@@ -142,13 +142,10 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
     ]
     notes: dict[str, None] = {}
     for what, (_, found) in parts.items():
-        chosen = sorted((one for one in found.values() if one), key=lambda one: (not one.confirmed, one.particles))
+        chosen = sorted((one for one in found.values() if one), key=lambda one: one.particles)
         if chosen:
             table = TabledList(chosen).table()
             lines += ["", f"{what}:", aligned(table, left=2, right=range(3, len(table[0])))]
-        if any(not one.confirmed for one in chosen):
-            few = f"up to {search.most:,} particles these are too few to be sure"
-            notes[f"* kept on all finer meshes tried, but {few}."] = None
         notes |= {
             f"{name}, {what}: {_nearest(search, name, what == 'with springs alone')}": None
             for name, one in found.items()
@@ -162,9 +159,9 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
         "with a margin: the last change may happen once more. Sizes between whole divisions are tried, too.",
         *subject.meaning("solved on each mesh"),
-        "Meshes are ranked by their particles. Static solve: of one load, measured here once. Largest step: of",
-        "undamped explicit integrators, about rest, held nowhere; it needs a density.",
         "A definition is given up if its error, by its change over the last doubling, stays too large on finer meshes.",
+        "Meshes are ranked by their particles. Largest step: of undamped explicit integrators, about rest, free of",
+        "supports; it needs a density.",
     ]
     return "\n".join([*lines, *notes])
 
@@ -183,7 +180,7 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     worst, particles, name, size = min(near, default=(math.inf, 0, "", 0.0))
     if worst == math.inf:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
-    further = "; finer ones do not keep it" if worst <= search.error else ""
+    further = "; finer ones do not confirm it" if worst <= search.error else ""
     return (
         f"none up to {max(count for _, count, *_ in near):,} particles; nearest is {name} at {mesh_size_text(size)} "
         f"({particles:,} particles), {100 * worst:.3g} % off at worst{further}"

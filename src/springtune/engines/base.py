@@ -179,8 +179,6 @@ class Engine(Declared):
         Optional dependencies of springtune that have them.
     laws : tuple of str
         Energies that it has besides springs, keys of `springtune.handover.terms.FORMULAS`.
-    springs : bool
-        Whether it has springs.
     precisions : tuple of str
         Its own first.
     parameters : dict of str to Parameter
@@ -227,7 +225,6 @@ class Engine(Declared):
     needs: tuple[str, ...] = ()
     extra: str = ""
     laws: tuple[str, ...] = ()
-    springs: bool = True
     precisions: tuple[str, ...] = PRECISIONS
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
     iterates: bool = True
@@ -259,7 +256,7 @@ class Engine(Declared):
         EngineAbsentError
             If it is not installed.
         EngineError
-            If it has no such precision, or lacks an energy or the springs of a net.
+            If it has no such precision, or lacks an energy of a net.
         """
         if setting.precision not in ("", *self.precisions):
             known = ", ".join(self.precisions)
@@ -267,8 +264,7 @@ class Engine(Declared):
                 f"precision: '{setting.precision}' is unknown to engine '{self.name}'; give one of {known}"
             )
         if net is not None:
-            lacking = _lacking(self, net)
-            if lacking:
+            if lacking := _lacking(self, net):
                 others = [one.name for one in ENGINES.values() if not _lacking(one, net)]
                 raise EngineError(
                     f"engine '{self.name}' has no {' and no '.join(lacking)}; take another definition, or engine "
@@ -343,8 +339,7 @@ def _there(need: str) -> bool:
 
 def _lacking(engine: Engine, net: SpringNet) -> list[str]:
     """Words for what a net has and an engine has not."""
-    energies = [WORDS[one.kind] for one in net.energies if one.kind not in engine.laws]
-    return energies if engine.springs or not np.any(net.stiffness) else [*energies, "springs"]
+    return [WORDS[one.kind] for one in net.energies if one.kind not in engine.laws]
 
 
 ENGINES: Registry[Engine] = Registry(__package__, "engine", "engines")

@@ -1,7 +1,6 @@
-"""Files of nets: CSV and JSON, which give back what was written, number by number; VTU; and models that run."""
+"""Files of nets: CSV; JSON, which gives back what was written, number by number; VTU; and models that run."""
 
 import json
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,10 +13,13 @@ import pandas as pd
 from ..mesh.formats import LONGEST_SAID
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.escapes import json_line, shown
+from ..scene.single import Scene
+from ..springs.base import Springs
 from .mujoco import mjcf
+from .net import NOT_COMPUTED, SpringNet
 from .newton import newton_script
 from .paraview import write_vtu
-from .sofa import sofa_python, sofa_xml
+from .sofa import sofa_python
 from .terms import OF_CORNERS, VALUES, Net, Terms
 from .xpbd import xpbd
 
@@ -25,7 +27,7 @@ from .xpbd import xpbd
 class Array(NamedTuple):
     """An array of a net: type, heads of its columns in a table, and the array that it has a row for each of."""
 
-    kind: type
+    dtype: type
     heads: tuple[str, ...]
     of: str = ""
 
@@ -51,9 +53,6 @@ ARRAYS = {
 CELL_ARRAYS = {3: "triangles", 4: "quads"}
 """Arrays that cells stand in, by their corners."""
 
-Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
-"""Content of a file: arrays by the names of `ARRAYS`, energies and header."""
-
 
 def write(path: str | Path, net: Net) -> list[Path]:
     """Write a net in the format of a name's ending; files appear whole or not at all."""
@@ -74,75 +73,48 @@ def write(path: str | Path, net: Net) -> list[Path]:
 
 
 def read(path: str | Path) -> Net:
-    """Read a net."""
+    """Read a net from JSON."""
     path = Path(path)
-    ending = ending_of(path)
+    if ending_of(path) != ".json":
+        raise ValueError(f"{path}: only nets that are written as .json are read; write the springs so")
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
-    if ending not in READERS:
-        program, _ = SIMULATORS.get(ending, ("ParaView", None))
-        raise ValueError(f"{path}: it is for {program}; read the springs from {', '.join(READERS)}")
     try:
-        with warnings.catch_warnings(action="ignore"):
-            return _checked(*READERS[ending](path))
-    except Exception as error:  # pandas and json raise many kinds of errors for a damaged file
-        if isinstance(error, OSError) and error.errno is not None:
-            raise
+        return _checked(json.loads(path.read_text(encoding="utf-8")))
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 
-def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: dict[str, Any]) -> Net:
-    """Net whose arrays fit each other."""
-    energies, rows = tuple(energies), _counts(header)
+def _checked(found: dict[str, Any]) -> Net:
+    """Net of a file's content, whose arrays fit each other."""
+    rows, arrays = dict[str, int](), dict[str, Any](masses=None)
     for name, about in ARRAYS.items():
-        if name in arrays:
-            array = arrays[name] = np.ascontiguousarray(arrays[name], dtype=about.kind)
-            count = rows.setdefault(about.of or name, len(array))
-            wanted = (count, *about.shape)
-            if array.shape != wanted:
-                raise ValueError(f"{name} of shape {array.shape} in the place of {wanted}")
-            if about.kind is np.int64 and array.size and not (0 <= array.min() and array.max() < rows["points"]):
-                raise ValueError(f"{name} of particles that it does not have")
-        elif name != "masses":
-            raise ValueError(f"it has no {name}")
+        if found[name] is None and name == "masses":
+            continue
+        array: np.ndarray = np.array(found[name], dtype=about.dtype).reshape(-1, *about.shape)
+        arrays[name] = array
+        if len(array) != rows.setdefault(about.of or name, len(array)):
+            raise ValueError(f"{name} of {len(array)} rows in the place of {rows[about.of]}")
+        if about.dtype is np.int64 and array.size and not (0 <= array.min() and array.max() < rows["points"]):
+            raise ValueError(f"{name} of particles that it does not have")
+    energies = [
+        Terms(one["kind"], arrays[one["cells"]], {name: np.array(one["values"][name]) for name in VALUES[one["kind"]]})
+        for one in found["energies"]
+    ]
     if any(values.shape[:1] != (len(terms.cells),) for terms in energies for values in terms.values.values()):
         raise ValueError("its terms are not as many as cells")
-    numbers = [array for name, array in arrays.items() if ARRAYS[name].kind is float]
+    numbers = [arrays[name] for name, about in ARRAYS.items() if about.dtype is float and arrays[name] is not None]
     numbers += [values for terms in energies for values in terms.values.values()]
     if not all(np.isfinite(array).all() for array in numbers):
         raise ValueError("some of its numbers are not finite")
-    if not isinstance(header.get("thickness"), float):
-        raise ValueError("its header has no thickness")
-    parts: dict[str, Any] = {"masses": None} | arrays
-    return Net(**parts, energies=energies, thickness=header["thickness"], header=header)
+    header = found["header"]
+    return Net(**arrays, energies=tuple(energies), thickness=float(header["thickness"]), header=header)
 
 
 def arrays_of(net: Net) -> dict[str, np.ndarray]:
     """Arrays that a net has, by the names of `ARRAYS`."""
     return {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
-
-
-def _counts(header: Mapping[str, Any]) -> dict[str, int]:
-    """Rows of arrays by the header; a user's own header may lack them."""
-    mesh = header.get("mesh") or {}
-    said = {"points": "particles", "springs": "springs", "triangles": "triangles", "quads": "quads"}
-    return {name: mesh[word] for name, word in said.items() if word in mesh}
-
-
-# -- tables of cells: the terms of their energies, column by column ------------------------------------------------
-
-
-def _terms(cells: np.ndarray, columns: Mapping[str, Any]) -> Iterable[Terms]:
-    """Terms of the columns of cells, such as ``area_modulus``."""
-    for kind, names in VALUES.items():
-        found = {
-            name: np.ascontiguousarray(columns[full], float) for name in names if (full := f"{kind}_{name}") in columns
-        }
-        if found and len(found) < len(names):
-            raise ValueError(f"{kind} terms without {', '.join(sorted(set(names) - set(found)))}")
-        if found:
-            yield Terms(kind, cells, found)
 
 
 def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
@@ -222,27 +194,6 @@ def _csv_text(arrays: Mapping[str, np.ndarray], heads: Heads) -> str:
     return str(pd.concat(columns, axis=1).to_csv(index=False, lineterminator="\n"))
 
 
-def _read_csv(path: Path) -> Read:
-    lines = path.read_text(encoding="utf-8").split("\n")  # not at line breaks within names
-    comments = [line[2:] for line in lines if line.startswith("#")]
-    header = json.loads("\n".join(comments[comments.index("{") :]))
-    others, counts = companions(path), _counts(header)
-    arrays: dict[str, np.ndarray] = {"triangles": np.zeros((0, 3)), "quads": np.zeros((0, 4))}
-    energies: list[Terms] = []
-    for place, heads in TABLES.items():
-        if place and not others[place].is_file():
-            if length := counts.get(next(iter(heads))):
-                raise ValueError(f"{others[place].name}, which has its {length} {place}, is not beside it")
-            continue
-        table = pd.read_csv(others.get(place, path), comment="#", float_precision="round_trip")
-        found = {name: table[[*titles]].to_numpy() for name, titles in heads.items() if titles[0] in table}
-        found = {name: values if values.shape[1] > 1 else values[:, 0] for name, values in found.items()}
-        arrays |= {name: values for name, values in found.items() if name in ARRAYS}
-        if place in CELL_ARRAYS.values():
-            energies += _terms(arrays[place], found)
-    return arrays, energies, header
-
-
 # -- JSON ----------------------------------------------------------------------------------------------------------
 
 
@@ -265,20 +216,6 @@ def _write_json(path: Path, net: Net) -> list[Path]:
     parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     write_text(path, "{\n" + ",\n".join(parts) + "\n}\n")
     return [path]
-
-
-def _read_json(path: Path) -> Read:
-    found = json.loads(path.read_text(encoding="utf-8"))
-    arrays: dict[str, np.ndarray] = {
-        name: np.array(found[name], dtype=one.kind).reshape(-1, *one.shape)
-        for name, one in ARRAYS.items()
-        if found[name] is not None
-    }
-    energies = [
-        Terms(one["kind"], arrays[one["cells"]], {name: np.array(one["values"][name]) for name in VALUES[one["kind"]]})
-        for one in found["energies"]
-    ]
-    return arrays, energies, found["header"]
 
 
 # -- VTU -----------------------------------------------------------------------------------------------------------
@@ -310,19 +247,9 @@ def write_vtu_with(
         {2: arrays["springs"], 3: arrays["triangles"], 4: arrays["quads"]},
         data | dict(of_particles),
         cell_data,
-        _numbers(net.header) | dict(numbers or {}),
+        {"thickness": net.header["thickness"]} | dict(numbers or {}),
         json.dumps(net.header, indent=1),
     )
-
-
-def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers of a header for ParaView."""
-    found = {"thickness": header["thickness"]}
-    for group in ("expected_error", "largest_stable_step"):
-        values = header.get(group)
-        if isinstance(values, dict):
-            found |= {f"{group}_{name}": value for name, value in values.items() if isinstance(value, float)}
-    return found
 
 
 # -- formats -------------------------------------------------------------------------------------------------------
@@ -336,15 +263,11 @@ def _write_vtu(path: Path, net: Net) -> list[Path]:
 NET_FORMATS = {".csv": _write_csv, ".json": _write_json, ".vtu": _write_vtu}
 """Functions that write a net, by the ending of the name of its file."""
 
-READERS = {".csv": _read_csv, ".json": _read_json}
-"""Functions that read one."""
-
 FOR_MUJOCO = (".xml", ".mjcf")
 """Endings of files for MuJoCo."""
 
 SIMULATORS: dict[str, tuple[str, Callable[[Net], str]]] = {
     **dict.fromkeys(FOR_MUJOCO, ("MuJoCo", mjcf)),
-    ".scn": ("SOFA", sofa_xml),
     ".py": ("SOFA", sofa_python),
     ".xpbd.json": ("XPBD", xpbd),
     ".newton.py": ("Newton", newton_script),
@@ -373,3 +296,37 @@ def ending_of(path: str | Path) -> str:
     if path.name.lower() == ending:
         raise ValueError(f"'{path}' is an ending alone; give a name before it, such as net{ending}")
     return ending
+
+
+# -- scenes --------------------------------------------------------------------------------------------------------
+
+
+def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: Any) -> list[Path]:
+    """Write springs of a scene, see `springtune.handover.net.SpringNet.write`."""
+    check_target(path)
+    return SpringNet.from_scene(scene, springs=springs, **options).write(path)
+
+
+def write_displaced(path: str | Path, scene: Scene, displacements: np.ndarray, compared: bool) -> list[Path]:
+    """Write a network at some displacements [m] for ParaView, with the reference's where they are compared."""
+    from ..reference.small_strain import ReferenceNotConvergedError  # here: finite elements are slow to import
+
+    path = Path(path)
+    if path.suffix.lower() != ".vtu":
+        raise ValueError(f"{path}: '{path.suffix}' is no format of displacements; give a name ending in .vtu")
+    check_folder(path)
+    net = SpringNet.from_scene(scene, errors=False)
+    of_particles = {"displacement": displacements}
+    if compared:
+        try:
+            reference = scene.reference().at(scene.mesh.points)
+        except ReferenceNotConvergedError as error:
+            net.header["reference"] = f"{NOT_COMPUTED}: {error}"
+        else:
+            of_particles |= {"reference_displacement": reference, "error": displacements - reference}
+            strain = "finite" if scene.finite_strain and not scene.objection else "small"
+            net.header["reference"] = scene.objection or f"finite elements, {strain} strain, converged"
+    forces = scene.springs.reference * scene.network.spring_forces(displacements, scene.kinematics == "linear")
+    numbers = {"displacement_of_the_load": scene.displacement_of(displacements)}
+    write_vtu_with(path, net, of_particles, {"force": forces}, numbers)
+    return [path]

@@ -33,17 +33,7 @@ LARGEST_ACCELERATION = 1e9
 
 
 def mjcf(net: Net) -> str:
-    """Model of a net for MuJoCo.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> beam, steel = st.Beam("40 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), steel, "traction", "1 kN", definition="lattice")
-    >>> [path] = scene.springs.write("net.xml")
-    >>> next(line for line in path.read_text().splitlines() if "<spatial" in line).strip()
-    '<spatial stiffness="90932667.39736606" springlength="0.02"><site site="p0"/><site site="p1"/></spatial>'
-    """
+    """Return the model of a net for MuJoCo."""
     return model(net, simulate(net, "MuJoCo", ("biquadratic",)))
 
 

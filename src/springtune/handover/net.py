@@ -17,7 +17,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -39,9 +39,6 @@ from ..scene.single import Scene
 from ..scene.statements import BeamStatement, ShapeStatement
 from ..springs.base import Definition, DefinitionError, Springs
 from .terms import Net, Terms, terms_of
-
-if TYPE_CHECKING:
-    from ..prediction.choices import ShapeReferences
 
 UNITS = {
     "points": "m",
@@ -167,7 +164,7 @@ class SpringNet(Tabled, Net):
             If the definition does not support the mesh or the material.
         """
         springs = scene.springs if springs is None else springs
-        about, forces = scene.statement, scene.statement.forces(scene.sheet, springs)
+        about, forces = scene.statement, scene.statement.forces(springs)
         parts = _parts(scene.definition, scene.sheet, about.materials, springs, about.masses(), mesh_name, scene.held)
         header = parts["header"]
         scale = about.scale if isinstance(about, ShapeStatement) else None
@@ -276,7 +273,7 @@ class SpringNet(Tabled, Net):
             ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
             beside it, such as ``net.particles.csv``; ``.json`` has the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
-            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` for Newton, ``.xpbd.json`` for XPBD.
+            ``.mjcf`` for MuJoCo, ``.py`` for SOFA, ``.newton.py`` for Newton, ``.xpbd.json`` for XPBD.
 
         Returns
         -------
@@ -304,7 +301,7 @@ class SpringNet(Tabled, Net):
         Parameters
         ----------
         path : str or Path
-            Ending in ``.csv`` or ``.json``, as `write` wrote it.
+            Ending in ``.json``, as `write` wrote it.
 
         Returns
         -------
@@ -418,8 +415,8 @@ def _expected_errors(
     for name in loads:
         if LOADS[name].kind.uniaxial or not definition.uniaxial:
             known = {name: reference_of(beam, material, name)}
-            statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear")
-            errors |= _in_words(errors_under(statement, sheet, springs, known), known)
+            statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear", sheet)
+            errors |= _in_words(errors_under(statement, springs, known), known)
     return errors
 
 
@@ -445,20 +442,19 @@ def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[
 def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import QuantityReference, errors_under, shape_references
+    from ..prediction.choices import QuantityReference, References, errors_under, shape_references
     from ..reference.small_strain import ReferenceNotConvergedError
 
     if why := _too_many(scene.sheet):
         return dict.fromkeys([one.name for one in scene.case.quantities], why)
-    linear = ShapeStatement(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear")
-    known: ShapeReferences
+    linear = ShapeStatement(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.sheet)
     try:
-        values = linear.reference_values(scene.sheet)
-        known = {name: QuantityReference(value, np.nan) for name, value in values.items()}
+        values = linear.reference_values()
+        known = References({name: QuantityReference(value, np.nan) for name, value in values.items()})
     except (ReferenceNotConvergedError, ValueError):
         # One quantity without a reference, such as stress at a corner, does not cost the others theirs.
         known = shape_references(linear)
-    return _in_words(errors_under(linear, scene.sheet, springs, known), known)
+    return _in_words(errors_under(linear, springs, known), known)
 
 
 def _stable_steps(

@@ -66,17 +66,7 @@ def colours(net: Net) -> list[np.ndarray]:
 
 
 def newton_script(net: Net) -> str:
-    """Script of a net for Newton's `ModelBuilder` and its solver VBD.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> beam, rubber = st.Beam("40 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "1 N", definition="delingette")
-    >>> [path] = scene.springs.write("net.newton.py")
-    >>> [line[:14] for line in path.read_text().splitlines() if line.startswith("TRI_K")]
-    ['TRI_KE = 384.6', 'TRI_KA = 329.6']
-    """
+    """Return a script of a net for Newton's `ModelBuilder` and its solver VBD."""
     simulation = simulate(net, "Newton", LAWS, membrane_energies)
     shear, first = membrane(net)
     largest, loaded, damping = simulation.largest_step, simulation.loaded_frequency, simulation.mass_damping

@@ -1,15 +1,13 @@
-"""Files for ParaView: an unstructured grid with its data (.vtu), and collections of such files (.pvd)."""
+"""Files for ParaView: an unstructured grid with its data (.vtu)."""
 
-import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from pathlib import Path
-from xml.sax.saxutils import quoteattr, unescape
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from ..mesh.formats import library
-from ..safe_io.atomic import UNFINISHED, replacing
+from ..safe_io.atomic import replacing
 from ..safe_io.escapes import shown
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
@@ -62,70 +60,3 @@ def write_vtu(
         grid_tag = "<UnstructuredGrid>"
         begin = f"<!--\n{said}\n-->{grid_tag}{fields}"
         unfinished.write_bytes(unfinished.read_bytes().replace(grid_tag.encode(), begin.encode(), 1))
-
-
-MOST_PIECES = 10_000
-"""Most files of a collection: more are slow in ParaView and file systems."""
-
-Add = Callable[..., None]
-"""Adds a piece to a collection: its time, what writes it to a file of a given name, and a name where it has one."""
-
-
-@contextmanager
-def series(path: str | Path) -> Iterator[Add]:
-    """Context in which a collection of files is written, which ParaView opens as one that changes in time.
-
-    ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none, and files of an older collection of
-    that name are removed. It yields ``add(time, write, name="")``: the time of a piece [s], the function that writes it
-    to a path, and a name in the place of a number.
-    """
-    path = Path(path)
-    folder, before = path.with_suffix(""), pieces_of(path)[1:]
-    made = not folder.exists()
-    folder.mkdir(parents=True, exist_ok=True)
-    times: list[float] = []
-    pieces: list[Path] = []
-
-    def add(time: float, write: Callable[[Path], None], name: str = "") -> None:
-        name = name or f"{folder.name}_{len(pieces):04}"
-        pieces.append(folder / f"{name}.vtu{UNFINISHED}")
-        times.append(time)
-        write(pieces[-1])
-
-    finished: list[Path] = []
-    try:
-        yield add
-        names = [piece.stem for piece in pieces]
-        rows = [
-            f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(f"{folder.name}/{name}")}/>'
-            for time, name in zip(times, names)
-        ]
-        lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
-        with replacing(path) as unfinished:
-            # All that takes room on a disk comes before the first file gets its name.
-            unfinished.write_text("\n".join([*lines, *rows, "  </Collection>", "</VTKFile>", ""]), encoding="utf-8")
-            for piece, name in zip(pieces, names):
-                finished.append(piece.replace(folder / name))
-    except BaseException:
-        for piece in {*pieces, *finished} - set(before):
-            piece.unlink(missing_ok=True)
-        if made:
-            with suppress(OSError):  # not empty: the first error is the one to raise
-                folder.rmdir()
-        raise
-    for old in set(before) - set(finished):
-        old.unlink(missing_ok=True)
-    if not finished:
-        with suppress(OSError):
-            folder.rmdir()
-
-
-def pieces_of(path: str | Path) -> list[Path]:
-    """A collection that `series` wrote and the files that it names; none where there is no such file."""
-    path = Path(path)
-    if not path.is_file():
-        return []
-    folder = path.with_suffix("")
-    named = re.findall(r' file="([^"]*)"', path.read_text(encoding="utf-8", errors="replace"))
-    mine = re.compile(rf"{re.escape(folder.name)}/([^/]*\.vtu)")  # other programs' collections may name any file
-    return [path, *(folder / found.group(1) for name in named if (found := mine.fullmatch(unescape(name))))]

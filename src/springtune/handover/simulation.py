@@ -261,7 +261,7 @@ def _templates() -> Any:
 
     made = jinja2.Environment(
         loader=jinja2.PackageLoader(__package__, "templates"),
-        autoescape=lambda name: str(name).endswith((".xml.jinja", ".scn.jinja")),
+        autoescape=lambda name: str(name).endswith(".xml.jinja"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

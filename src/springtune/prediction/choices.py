@@ -5,7 +5,6 @@ compared with the converged reference of small strain. The best ones are kept, o
 between rollers measures Young's modulus and Poisson's ratio of the network.
 """
 
-import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, nan
@@ -25,7 +24,7 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
 from ..problem.shapes import Shape
 from ..problem.status import Status
-from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution
+from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
@@ -57,19 +56,16 @@ ROUNDED = 1e-9
 
 _T = TypeVar("_T")
 
-References = dict[str, ReferenceSolution | str]
-"""References of 1 N by load, or why one is missing."""
-
 
 class QuantityReference(NamedTuple):
-    """A quantity of interest of a shape by finite elements, and its relative error estimate [1]."""
+    """A displacement or another quantity of interest by finite elements, and its relative error estimate [1]."""
 
     value: float
     error_estimate: float
 
 
-ShapeReferences = dict[str, QuantityReference | str]
-"""References by quantity of interest, or why one is missing."""
+References = dict[str, QuantityReference | str]
+"""References by load of 1 N on a beam, or by quantity of interest of a shape; or why one is missing."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -83,7 +79,7 @@ class Choice(Tabled):
     inside, outline : float
         Stiffness of the sides of cells inside and on the outline [N/m]; NaN where they differ from one to the next.
     extra : str
-        Energies, diagonals and scale besides these springs, in words.
+        Energies and diagonals besides these springs, in words.
     energies : bool
         Whether it needs more than springs.
     errors : dict of str to float
@@ -110,7 +106,7 @@ class Choice(Tabled):
     ['van-gelder-general', 'element-fit', 'patch', 'energy-fit']
     >>> best = choices[2]
     >>> print(f"{best.inside:.4g} N/m inside, {best.outline:.4g} N/m on the outline, {best.extra}")
-    1.742e+08 N/m inside, 8.71e+07 N/m on the outline, area energy, K_A = -1.078e+04 MPa; 0.93393 times area
+    1.742e+08 N/m inside, 8.71e+07 N/m on the outline, area energy, K_A = -1.078e+04 MPa
     >>> print(*(f"{load} {100 * error:+.1f} %," for load, error in best.errors.items()))
     traction +0.4 %, bending -6.3 %, shear +1.6 %,
     >>> print(f"{100 * best.worst:.1f} % at worst; E off by {100 * abs(best.young_modulus_error):.1f} %, "
@@ -185,10 +181,7 @@ def check_beam(beam: Beam) -> None:
 
 
 def predicted() -> tuple[str, ...]:
-    """Loads that can be predicted, keys of `springtune.problem.loads.LOADS`.
-
-    All but those that turn with the side that they act on, which linear kinematics do not tell from the others.
-    """
+    """Loads that can be predicted: all but those that turn, which linear kinematics do not tell from others."""
     return tuple(name for name, load in LOADS.items() if not load.follower)
 
 
@@ -218,25 +211,26 @@ def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> 
     return {load: reference_of(beam, material, load) for load in check_loads(loads)}
 
 
-def reference_of(beam: Beam, material: Material, load: str) -> ReferenceSolution | str:
+def reference_of(beam: Beam, material: Material, load: str) -> QuantityReference | str:
     """Reference of 1 N of any load, or why there is none."""
     try:
-        return unit_reference(beam, material, LOADS[load].kind, 1.0)
+        found = unit_reference(beam, material, LOADS[load].kind, LOADS[load].sign)
     except ReferenceNotConvergedError as error:
         return str(error)
+    return QuantityReference(found.displacement, found.error_estimate)
 
 
 def predict(
     beam: Beam | Shape,
     mesh: Mesh | GroupedMesh,
     material: AnyMaterial | Mapping[str, AnyMaterial],
-    known: References | ShapeReferences | None = None,
+    known: References | None = None,
     *,
     loads: Iterable[str] = CASES,
     load: str | None = None,
     also: Iterable[str] = (),
 ) -> list[Choice]:
-    """Choices for a mesh, solved on it, the best one by its worst load first, or quantity of a shape.
+    """Solve definitions on a mesh and return the best ones, by their worst load or quantity of a shape.
 
     Parameters
     ----------
@@ -246,8 +240,7 @@ def predict(
     material : Material, AnisotropicMaterial or mapping of str to those
         Of a shape of several parts by their names.
     known : dict, optional
-        What `springtune.prediction.references` gave for the beam, the material and the loads; of a shape what
-        `springtune.prediction.shape_references` gave.
+        References of the loads or quantities, as `springtune.prediction.choices.references` returns them.
     loads : iterable of str, optional
         Loads of a beam that count: of traction, compression, bending, shear and pressure.
     load : str, optional
@@ -272,8 +265,8 @@ def predict(
     Notes
     -----
     Each number equals that of a scene of the same beam, mesh, material, load and definition in linear kinematics.
-    Tried are all of `springtune.DEFINITIONS` that suit the cells and the material, but for searches, those that are
-    given a stiffness, and forces that go with uniaxial loads.
+    All of `springtune.DEFINITIONS` are tried that suit the cells and the material, but for searches and for those that
+    need a stiffness or a uniaxial load.
 
     Examples
     --------
@@ -283,12 +276,6 @@ def predict(
     >>> best = st.predict(beam, mesh, steel)[0]
     >>> print(f"{best.definition}: {100 * best.worst:.1f} % at worst")
     van-gelder-general: 5.0 % at worst
-    >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.definition, kinematics="linear")
-    >>> print(f"{100 * best.errors['bending']:.4f} %, {100 * scene.solve().error:.4f} %")
-    -5.0296 %, -5.0296 %
-
-    A part that is pulled, and pressed upon:
-
     >>> best = st.predict(beam, mesh, steel, loads=["traction", "pressure"])[0]
     >>> print(best.definition, *(f"{load} {100 * error:+.2f} %" for load, error in best.errors.items()))
     delingette traction -0.09 % pressure +0.05 %
@@ -315,7 +302,7 @@ def trial(
     beam: Beam | Shape,
     mesh: Mesh | GroupedMesh,
     material: AnyMaterial | Mapping[str, AnyMaterial],
-    known: References | ShapeReferences | None = None,
+    known: References | None = None,
     *,
     loads: Iterable[str] = CASES,
     load: str | None = None,
@@ -325,20 +312,14 @@ def trial(
     more = [chosen(DEFINITIONS, name, "also").name for name in also]
     if isinstance(beam, Shape):
         statement = ShapeStatement(beam, mesh, material, only_load(beam, load), 1.0, "linear")
-        known = shape_references(statement) if known is None else cast(ShapeReferences, known)
-        return Trial([statement], known, also=more)
+        return Trial([statement], shape_references(statement) if known is None else known, also=more)
     if load is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
     under_loads = beam_statements(beam, mesh, material, loads)
     named = [one.load for one in under_loads]
-    missing = [load for load in named if known is not None and not (isinstance(known, dict) and load in known)]
-    if missing:
-        raise ValueError(
-            f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
-        )
     known = references(beam, under_loads[0].material, named) if known is None else known
-    return Trial(under_loads, {load: cast(References, known)[load] for load in named}, also=more)
+    return Trial(under_loads, {load: known[load] for load in named}, also=more)
 
 
 def beam_statements(
@@ -385,16 +366,13 @@ def only_load(shape: Shape, load: str | None) -> str:
     return next(iter(shape.loads))
 
 
-def shape_references(statement: ShapeStatement) -> ShapeReferences:
-    """References of the quantities of interest of a shape under a load case.
-
-    A quantity without a reference, such as the stress at a corner, leaves the others theirs.
-    """
+def shape_references(statement: ShapeStatement) -> References:
+    """References of the quantities of a load case, each found or missing by itself."""
     from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
     case, as_read = statement.case, statement.grouped if statement.shape.file else None
     solved, lacking = solve_each(statement.shape, case, statement.by_part, as_read)
-    found = ShapeReferences(lacking)
+    found = References(lacking)
     for one in solved:
         found |= {
             name: QuantityReference(float(value), float(one.error_estimates[name]))
@@ -406,30 +384,23 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
     return {one.name: found[one.name] for one in case.quantities}
 
 
-def errors_under(
-    statement: Statement, sheet: Sheet, springs: Springs, known: Mapping[str, Any]
-) -> dict[str, float | str]:
+def errors_under(statement: Statement, springs: Springs, known: References) -> dict[str, float | str]:
     """Errors [1] by load of a beam or quantity of a shape; NaN without a reference, or why the network fails."""
     labels = [statement.load] if isinstance(statement, BeamStatement) else list(known)
     try:
-        found = statement.solve(sheet, springs)
+        found = statement.solve(springs)
     except SingularError as error:
         return dict.fromkeys(labels, f"unstable: {error}")
     if found.status is not Status.SOLVED:
         return dict.fromkeys(labels, found.message)
-    values = statement.values(springs, found)
-    if isinstance(statement, BeamStatement):
-        wanted = {load: statement.force * one.displacement for load, one in known.items() if not isinstance(one, str)}
-        return dict(quantity_errors({statement.load: found.displacement}, wanted))
+    of_beam = isinstance(statement, BeamStatement)
+    values = {statement.load: found.displacement} if of_beam else statement.values(springs, found)
     wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
-    return dict(quantity_errors({name: values[name] for name in known}, wanted))
+    return dict(quantity_errors({name: values[name] for name in labels}, wanted))
 
 
 def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], also: Collection[str] = ()) -> list[str]:
-    """The best definitions of springs alone and of all, and those of `also`, the least worst error first.
-
-    `found` tells of a definition whether it has energies, and its worst error.
-    """
+    """Best definitions of springs alone and of all, and those of `also` by (energies, worst error) of each."""
     order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), as_sure_as(known))
     best = order[:KEPT] + [name for name in order if not found[name][0]][:KEPT]
     return [name for name in order if name in best or name in also]
@@ -438,17 +409,14 @@ def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], a
 class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
-    `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
-    shape; `among` replaces the definitions that suit the mesh, `also` adds some.
-
-    `names` are these definitions; `same` has for each one with springs the first one with the same springs;
-    `failures` are as of `Choice`, for each definition without.
+    `names` are the definitions, `same` has for each one with springs the first one with the same springs, `failures`
+    are as of `Choice`. `among` replaces the definitions that suit the mesh, `also` adds some.
     """
 
     def __init__(
         self,
         statements: Sequence[Statement],
-        known: References | ShapeReferences,
+        known: References,
         among: Iterable[str] | None = None,
         also: Iterable[str] = (),
     ) -> None:
@@ -473,7 +441,7 @@ class Trial:
         """Springs of a definition, derived once; None where it has none, for a reason in `failures`."""
         if name not in self.same and name not in self.failures:
             try:
-                springs = self.statements[0].springs(self._sheet, DEFINITIONS[name], None)[0]
+                springs = self.statements[0].springs(DEFINITIONS[name], None)[0]
             except DefinitionError as error:
                 self.failures[name] = {"springs": str(error)}
             except SingularError as error:
@@ -493,7 +461,7 @@ class Trial:
         """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
         if (name := self.same[name]) not in self._errors:
             if (first := self._alike(name)) not in self._errors:
-                each = (errors_under(one, self._sheet, self._springs[name], self.known) for one in self.statements)
+                each = (errors_under(one, self._springs[name], self.known) for one in self.statements)
                 self._errors[first] = {label: error for one in each for label, error in one.items()}
             self._errors[name] = self._errors[first]
         return self._errors[name]
@@ -512,10 +480,7 @@ class Trial:
         return name
 
     def choices(self, without: Collection[str] = ()) -> TabledList[Choice]:
-        """The best choices of all but the definitions `without`, the least worst error first.
-
-        Errors that differ by less than the error estimates are equal: then springs alone come first, then names.
-        """
+        """Best choices of all but the definitions `without`, see `in_order`."""
         names = [name for name in self.names if name not in without]
         measured = {name: one for name in names if (one := self.measured(name))}
         found = [self.choice(name) for name in best_of(measured, self.known, self._also)]
@@ -531,10 +496,7 @@ class Trial:
         return tuple(name for name in self.names if name in self.same or "patch test" in self.failures.get(name, ()))
 
     def measured(self, name: str) -> tuple[bool, float] | None:
-        """Whether a definition has energies, and its worst error, infinite where it is unstable; see `best_of`.
-
-        None where it has no springs of its own.
-        """
+        """Whether a definition has energies, and its worst error; None where it has no springs of its own."""
         springs = self.springs(name)
         if springs is None:
             return None if "springs" in self.failures[name] and name not in self._also else (False, inf)
@@ -570,7 +532,7 @@ class Trial:
                 poisson = float(moduli[1])
         return Choice(
             name,
-            *in_words(self._sheet, self.materials[0] if len(self.materials) == 1 else None, name, springs),
+            *in_words(self._sheet, springs),
             bool(springs.energies),
             errors={label: nan if isinstance(error, str) else error for label, error in found.items()},
             young_modulus_error=young,
@@ -578,18 +540,13 @@ class Trial:
             failures=failures,
         )
 
-    def cost(self, name: str) -> tuple[float, float]:
-        """Seconds of the longest static solve, and the largest stable explicit step [s], NaN where it is not found."""
-        springs, inertia, seconds = self._springs[name], self.statements[0].masses(), 0.0
-        for statement in {one.loading.key: one for one in self.statements}.values():
-            sheet = Sheet(self.mesh, self.thickness)
-            begin = time.perf_counter()
-            statement.solve(sheet, springs)
-            seconds = max(seconds, time.perf_counter() - begin)
+    def step_limit(self, name: str) -> float:
+        """Largest stable explicit step [s]; NaN without masses or where it is not found."""
+        inertia = self.statements[0].masses()
         if inertia is None:
-            return seconds, nan
-        steps = stable_steps(Sheet(self.mesh, self.thickness), springs, inertia, ["central-difference"])
-        return seconds, nan if isinstance(steps, str) else float(steps["central-difference"])
+            return nan
+        steps = stable_steps(Sheet(self.mesh, self.thickness), self._springs[name], inertia, ["central-difference"])
+        return nan if isinstance(steps, str) else float(steps["central-difference"])
 
 
 IN_WORDS = (
@@ -600,7 +557,7 @@ IN_WORDS = (
 """Words for energies besides areas."""
 
 
-def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
+def in_words(sheet: Sheet, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = sheet.mesh
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1
@@ -616,11 +573,7 @@ def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Spr
             extra.append(next(words for kind, words in IN_WORDS if isinstance(energy, kind)))
     if len(mesh.quads):
         extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
-    plain = {"patch": "lattice", "patch-area": "area"}.get(name)
-    if plain and material is not None and not len(mesh.quads):
-        scale = springs.reference / sheet.derive(plain, material)[0].reference
-        extra.append(f"{scale:.5f} times {plain}")
-    return inside, at_outline, "; ".join([*(() if springs.energies else ("none",)), *extra])
+    return inside, at_outline, "; ".join(extra) or "nothing"
 
 
 def _common(values: np.ndarray) -> float:

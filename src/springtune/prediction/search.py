@@ -33,9 +33,7 @@ from .choices import (
     CASES,
     SEARCHED_PARTICLES,
     Choice,
-    QuantityReference,
     References,
-    ShapeReferences,
     Trial,
     as_sure_as,
     beam_statements,
@@ -143,24 +141,20 @@ class MeshChoice(Tabled):
     choice : Choice
         The definition, its stiffness and its errors.
     particles, springs : int
-    seconds : float
-        Time of one static solve with linear kinematics, without deriving springs, the longest of the loads.
     step_limit : float
         Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which no
         support lowers; NaN without a density, or if the eigenvalue is not found.
     finer : tuple of SolvedMesh
-        Finer meshes that were tried, on each of which the definition keeps the error, too.
-    confirmed : bool
-        Whether these are enough: two at least, up to one with twice as many cells across and sizes between whole
-        divisions, and the error would be kept even if it changed once more by as much as over the last doubling.
+        Finer meshes that were tried, on each of which the definition keeps the error, too: two at least, up to one with
+        twice as many cells across, and sizes between whole divisions.
 
     Examples
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
     >>> best = st.find_mesh(beam, steel, "10 %", loads=["traction", "bending"], mesh_types=["structured"]).best
-    >>> best.size, best.cells, best.particles, best.confirmed
-    (0.0231, 2, 31, True)
+    >>> best.size, best.cells, best.particles
+    (0.0231, 2, 31)
     >>> [finer.cells for finer in best.finer][:6]
     [2.244, 2.447, 2.519, 2.669, 3, 3.174]
     >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
@@ -175,20 +169,17 @@ class MeshChoice(Tabled):
     choice: Choice
     particles: int
     springs: int
-    seconds: float
     step_limit: float
     finer: tuple[SolvedMesh, ...] = field(repr=False)
-    confirmed: bool
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "mesh", self.mesh_type
         yield "size", mesh_size_text(self.size)
-        yield "definition", self.choice.definition + ("" if self.confirmed else " *")
+        yield "definition", self.choice.definition
         for name in ("cells", "particles", "springs"):
             yield name, f"{getattr(self, name):,}"
         for name, error in self.choice.errors.items():
             yield name, number_text(error, error_text, "")
-        yield "static solve", f"{1e3 * self.seconds:.3g} ms"
         if not math.isnan(self.step_limit):
             yield "largest step", f"{self.step_limit:.3g} s"
 
@@ -197,8 +188,7 @@ def answer_text(one: MeshChoice | None) -> str:
     """Mesh and definition of an answer in words."""
     if one is None:
         return "none"
-    sure = "" if one.confirmed else ", not confirmed by finer meshes"
-    return f"{one.mesh_type} {mesh_size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
+    return f"{one.mesh_type} {mesh_size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,8 +206,8 @@ class MeshSearch(Tabled):
     known : dict
         Reference of 1 N by load; of a shape by quantity of interest, and `loads` are these quantities.
     by_type : dict of str to MeshChoice or None
-        The coarsest mesh by mesh type, with a definition that keeps the error; None if there is none up to `most`
-        particles. Without enough finer meshes it is not `MeshChoice.confirmed`.
+        The coarsest mesh by mesh type, with a definition that keeps the error; None if there is none that finer meshes
+        of up to `most` particles confirm.
     springs_by_type : dict of str to MeshChoice or None
         As `by_type`, for springs alone.
     tried : tuple of SolvedMesh
@@ -239,14 +229,14 @@ class MeshSearch(Tabled):
     error: float
     loads: tuple[str, ...]
     most: int
-    known: References | ShapeReferences = field(repr=False)
+    known: References = field(repr=False)
     by_type: dict[str, MeshChoice | None]
     springs_by_type: dict[str, MeshChoice | None]
     tried: tuple[SolvedMesh, ...] = field(repr=False)
 
     @property
     def best(self) -> MeshChoice | None:
-        """The mesh with the fewest particles, confirmed ones first; None if no mesh keeps the error."""
+        """The mesh with the fewest particles; None if no mesh keeps the error."""
         return self._least(self.by_type)
 
     @property
@@ -263,8 +253,8 @@ class MeshSearch(Tabled):
         yield "solved", f"{len(self.tried)} meshes, of at most {self.most:,} particles"
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
-        def rank(one: MeshChoice) -> tuple[bool, int, int]:
-            return not one.confirmed, one.particles, one.springs
+        def rank(one: MeshChoice) -> tuple[int, int]:
+            return one.particles, one.springs
 
         ranked = sorted(filter(None, found.values()), key=rank)
         alike = [one for one in ranked if rank(one) == rank(ranked[0])]
@@ -355,7 +345,6 @@ def find_mesh(
     wanted = asked_error(error)
     if not (isinstance(most, int) and most > 0):
         raise ValueError(f"most: {most!r} is no number of particles; give one such as {SEARCHED_PARTICLES}")
-    known: References | ShapeReferences
     if isinstance(beam, Shape):
         if loads is not CASES or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
@@ -376,7 +365,7 @@ def find_mesh(
         known = references(beam, material, loads)
         what, remedy = "loads", ""
     for name, one in known.items():
-        if isinstance(one, str) or isinstance(one, QuantityReference) and not one.value:
+        if isinstance(one, str) or not one.value:
             why = one if isinstance(one, str) else "it is zero"
             raise ValueError(f"{what}: {name!r} has no reference, so no error of it can be kept: {why}{remedy}")
     estimates = {name: one.error_estimate for name, one in known.items() if not isinstance(one, str)}
@@ -457,7 +446,7 @@ class _Search:
     def __init__(
         self,
         family: _Family,
-        known: References | ShapeReferences,
+        known: References,
         estimates: dict[str, float],
         error: float,
         most: int,
@@ -468,7 +457,6 @@ class _Search:
         self._finest = _cells(len(self._rungs))
         self._meshes: dict[bytes, SolvedMesh] = {}  # by their points
         self._keys: dict[float, bytes] = {}  # by cells across
-        self._choices: dict[tuple[int, str], MeshChoice] = {}
 
     @property
     def solved(self) -> list[SolvedMesh]:
@@ -479,12 +467,12 @@ class _Search:
         """The coarsest mesh with a definition that keeps the error on it and on finer ones; None without one."""
         for rung in (*self._rungs, None):
             names = [name for name in tried_names(self.solved, springs_alone) if self._promising(name)]
-            sure = self._confirmed(springs_alone)
-            if sure or rung is None or self._meshes and not names:
+            if start := self._confirmed(springs_alone):
+                return self._choice(*start, springs_alone)
+            if rung is None or self._meshes and not names:
                 break
             self._solve(rung, names)
-        start = sure or self._start(springs_alone, confirmed=False)
-        return self._choice(*start, springs_alone, sure is not None) if start else None
+        return None
 
     def _confirmed(self, springs_alone: bool) -> tuple[int, list[str]] | None:
         """As `_start`, with sizes between whole divisions tried."""
@@ -499,7 +487,7 @@ class _Search:
                 return start
         return None
 
-    def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
+    def _start(self, springs_alone: bool) -> tuple[int, list[str]] | None:
         """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
         starts: dict[int, list[str]] = {}
         for name in tried_names(self.solved, springs_alone):
@@ -507,9 +495,9 @@ class _Search:
             failing = max((one.cells for one in tried if not self._keeps(name, one)), default=0)
             kept = [int(one.cells) for one in self._on(name) if one.cells > failing]
             # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
-            taken = [cells for cells in kept[:-FEWEST_FINER] if ENOUGH_FINER * cells <= kept[-1]] if confirmed else kept
-            if taken and (not confirmed or self._steady(name)):
-                starts.setdefault(taken[0], []).append(name)
+            enough = [cells for cells in kept[:-FEWEST_FINER] if ENOUGH_FINER * cells <= kept[-1]]
+            if enough and self._steady(name):
+                starts.setdefault(enough[0], []).append(name)
         return min(starts.items()) if starts else None  # no two have the same cells
 
     def _size(self, cells: float) -> float:
@@ -545,24 +533,21 @@ class _Search:
         self._meshes[key] = replace(found, errors=errors, energies=energies)
         return self._meshes[key]
 
-    def _choice(self, cells: int, names: list[str], springs_alone: bool, confirmed: bool) -> MeshChoice:
-        """The best of some definitions on a mesh, with its cost."""
+    def _choice(self, cells: int, names: list[str], springs_alone: bool) -> MeshChoice:
+        """The best of some definitions on a mesh."""
         one = self._meshes[self._keys[cells]]
         name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
-        if (cells, name) not in self._choices:
-            tried = Trial(self.family.statements(one.size), self.known, [name])
-            self._choices[cells, name] = MeshChoice(
-                self.family.name,
-                one.size,
-                cells,
-                replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone))),
-                one.particles,
-                one.springs,
-                *tried.cost(name),
-                tuple(finer for finer in self.solved if finer.cells > cells and name in finer.errors),
-                confirmed,
-            )
-        return self._choices[cells, name]
+        tried = Trial(self.family.statements(one.size), self.known, [name])
+        return MeshChoice(
+            self.family.name,
+            one.size,
+            cells,
+            replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone))),
+            one.particles,
+            one.springs,
+            tried.step_limit(name),
+            tuple(finer for finer in self.solved if finer.cells > cells and name in finer.errors),
+        )
 
     def _keeps(self, name: str, mesh: SolvedMesh | None) -> bool:
         """Whether a definition keeps the error on a mesh, if there is one; the reference's error estimate is added."""

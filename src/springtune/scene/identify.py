@@ -26,7 +26,7 @@ from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
 from .meshes import is_a
-from .residuals import FEWEST_POINTS, Noise, correlated, excess, measured
+from .residuals import FEWEST_POINTS, excess, measured
 from .sheet import chosen
 
 if TYPE_CHECKING:
@@ -54,9 +54,6 @@ RATIO = 0.1
 
 POOR = 0.5
 """Half of an interval from which on a constant is poorly determined: of a ratio, or relative."""
-
-MISFIT = 1.5
-"""Residuals over the noise that is given from which on a model misfits."""
 
 CHANCE = 0.01
 """Probability of residuals by chance below which a law misfits."""
@@ -188,8 +185,7 @@ class Model:
         own = np.abs(np.diag(triangle))
         rank = int(np.count_nonzero(own > NULL * own[0]))
         labels, unknowns = ", ".join(block.label for block in self.blocks), ", ".join(names)
-        estimated = any(block.noise is None for block in self.blocks)
-        if self.counts.sum() < max(rank, 1) + estimated or self.counts.min() < 1:
+        if self.counts.sum() <= max(rank, 1) or self.counts.min() < 1:
             count = f"{max(self.counts.sum(), 0)} numbers besides the shift"
             raise TestDataError(f"{labels}: {count}, for the unknowns {unknowns} and the noise; give more rows")
         if not rank:
@@ -201,10 +197,9 @@ class Model:
     ) -> tuple[dict[str, Any], list[np.ndarray], np.ndarray, np.ndarray]:
         """Fit named constants; return all, `residuals`, the noise of each block, and halves of 95 % intervals of steps.
 
-        Noise that is not given is estimated from the residuals of each block. Intervals are by Student's t.
+        Noise is estimated from the residuals of each block. Intervals are by Student's t.
         """
-        given = np.array([block.noise or 0.0 for block in self.blocks])
-        noise = np.where(given, given, self.sizes)
+        noise = self.sizes
         freedom = self.counts * max(1 - len(names) / self.counts.sum(), LEAST_NOISE)
         # Moduli stay within factors of exp(30), even where forces and displacements contradict each other.
         bounds = np.array([(-1.0, 0.5) if name == "nu" else (-30.0, 30.0) for name in names])
@@ -231,11 +226,10 @@ class Model:
                 ftol=1e-10,
             ).x
             sums = squares(tables(steps.tobytes(), noise.tobytes()), np.ones(len(noise)))
-            settled = np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
-            before, noise = noise, np.where(given, given, settled)
+            before, noise = noise, np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
             if np.allclose(noise, before, rtol=1e-3, atol=0):
                 break
-        half = t.ppf(0.975, freedom[given == 0].sum() or np.inf) * np.linalg.norm(inverse(table(steps)[:, 1:]), axis=1)
+        half = t.ppf(0.975, freedom.sum()) * np.linalg.norm(inverse(table(steps)[:, 1:]), axis=1)
         found = list(tables(steps.tobytes(), noise.tobytes()))
         return varied(constants, names, steps), found, noise, half.clip(max=600)  # exp(700) is infinite
 
@@ -256,7 +250,7 @@ class Identified(Tabled):
     notes : tuple of str
         What the tests do not tell, with the remedy, and signs that the model does not fit.
     noise : dict of str to float
-        Noise of each column or field, given or estimated [m].
+        Noise of each column or field, estimated [m].
     residuals : dict of str to ndarray of float
         Predicted less measured values over the noise [1], without shifts.
     materials : dict of str to Material or AnisotropicMaterial
@@ -459,16 +453,11 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
     """Result of a fit, with notes on what tests do not tell, and where the model does not fit; without materials."""
     lacking, constants, tables, noise, half = _fitted(model, constants, free)
     names = [name for name in free if name not in lacking]
-    wider, odd = _checked(model, constants, tables, noise)
-    half = (half * wider).clip(max=600)
+    odd = _checked(model, constants, tables, noise)
     notes = [f"{name}: not determined by these data; {REMEDIES.get(name, 'add a force')}" for name in lacking] + notes
     for name in np.array(names)[half > POOR]:
         notes.append(f"{name}: poorly determined by these data; {REMEDIES.get(name, 'add a test')}")
     residuals = {block.label: table[:, 0] for block, table in zip(model.blocks, tables)}
-    for block, one in zip(model.blocks, residuals.values()):
-        size = np.sqrt((one @ one) / len(one))
-        if block.noise is not None and size > MISFIT:
-            odd.append(f"{block.label}: residuals are {size:.2g} times the given noise; the model does not fit")
     fitted = {name: value if name in names else np.nan for name, value in constants.items()}
     low, high = (varied(fitted, names, one) for one in (-half, half))
     for name in [name for name in ASSUMED if high.get(name, 0) < 0]:
@@ -481,49 +470,32 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
     return Identified(law, values, intervals, tuple(lacking), (*notes, *odd), noises, residuals, {}, places)
 
 
-def _checked(
-    model: Model, constants: dict[str, Any], tables: list[np.ndarray], noise: np.ndarray
-) -> tuple[np.ndarray, list[str]]:
-    """Factors by which intervals widen, and notes: residuals are not random, or follow a more general law."""
+def _checked(model: Model, constants: dict[str, Any], tables: list[np.ndarray], noise: np.ndarray) -> list[str]:
+    """Notes on residuals that are not random, or that follow a more general law."""
     residual, slopes = np.concatenate(tables)[:, 0], np.concatenate(tables)[:, 1:]
     left, sizes, _ = np.linalg.svd(slopes, full_matrices=False)
     tested = zip(model.blocks, model.general(constants), noise)
     beyond = np.concatenate([block.unshifted(table[:, 1:]) / one for block, table, one in tested])
     others, strong, _ = np.linalg.svd(beyond - left @ (left.T @ beyond), full_matrices=False)
-    basis = np.hstack([left, others[:, strong > 1e-6 * sizes[0]]])
-    along, known = basis.T @ residual, len(sizes)
-    freedom = float(model.counts.sum() - basis.shape[1])
+    others = others[:, strong > 1e-6 * sizes[0]]
+    extra = others.shape[1]
+    freedom = float(model.counts.sum() - left.shape[1] - extra)
     if freedom < FEWEST_POINTS:
-        return np.ones(known), []
-    rest, law = residual - basis @ along, basis[:, known:] @ along[known:]
-    notes, least, misfit = [], freedom, False
-    errors, covariance = np.zeros((known, known)), np.zeros((basis.shape[1], basis.shape[1]))
+        return []
+    along = others.T @ residual
+    law = others @ along
+    rest = residual - left @ (left.T @ residual) - law
     ends = np.cumsum([len(table) for table in tables])[:-1]
-    each = zip(model.blocks, model.counts, noise, *(np.split(one, ends) for one in (rest, law, basis)))
-    for block, count, one, own, follows, table in each:
+    notes, misfit = [], False
+    for block, one, own, follows in zip(model.blocks, noise, np.split(rest, ends), np.split(law, ends)):
         error = MODEL * np.sqrt(np.mean(block.values**2)) / one
         misfit |= bool(np.sqrt(np.mean(follows**2)) > error)
-        found = Noise(max(float(own @ own) * model.counts.sum() / count / freedom, LEAST_NOISE))
-        white = found.variance
         if excess(block.by_place(own), block.places) > error**2:
+            why = "so the intervals are too narrow; leave out where the law does not hold"
             if block.places.ndim > 1:
-                columns = block.by_place(np.hstack([table, block.shifts]))
-                found, white = correlated(block.by_place(own), columns, block.places), 1.0
-                least = min(least, found.freedom)
-                found_over = (
-                    f"but correlated over some {1e3 * found.reach:.2g} mm; intervals are widened as for overlapping"
-                )
-                why = f"{found_over} subsets, and do not hold if the law, the load or the supports are others"
-            else:
-                why = "so the intervals are too narrow; leave out where the law does not hold"
+                why += ", check load and supports, and give fewer points of overlapping subsets"
             notes.append(f"{block.label}: residuals are not random, {why}")
-        own_part = found.sums(block.by_place(table), block.places)
-        covariance, errors = covariance + own_part, errors + own_part[:known, :known] / white
-    steps, extra = inverse(slopes), basis.shape[1] - known
-    wider = np.sqrt(np.diag(steps @ errors @ steps.T) / (steps**2).sum(axis=1))
-    if extra and misfit:
-        shares = np.linalg.solve(covariance[known:, known:], along[known:])
-        if f.sf(along[known:] @ shares / extra, extra, least) < CHANCE:
-            why = "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold"
-            notes.append(f"{why}; check the law, the angle, known constants, and the signs of columns")
-    return wider.clip(1) * t.ppf(0.975, least) / t.ppf(0.975, freedom), notes
+    if misfit and f.sf((along @ along / extra) / (rest @ rest / freedom), extra, freedom) < CHANCE:
+        why = "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold"
+        notes.append(f"{why}; check the law, the angle, known constants, and the signs of columns")
+    return notes

@@ -54,7 +54,6 @@ class Block:
     factors: np.ndarray
     rows: csr_array | np.ndarray
     shifts: np.ndarray
-    noise: float | None
     places: np.ndarray
 
     def unshifted(self, columns: np.ndarray) -> np.ndarray:
@@ -92,8 +91,6 @@ class MeasuredTest:
         Force on a beam [N] at which a field was measured; the load case of a shape has its own.
     angle : float or str, optional
         Angle of the material's first axis from x [rad], of a coupon that was cut out at an angle.
-    noise : float or str, optional
-        Standard deviation of displacements [m]. By default estimated from the residuals.
     shift : bool, optional
         Whether a rigid motion of a field, or the zero of a curve, is estimated and removed.
 
@@ -120,7 +117,6 @@ class MeasuredTest:
     file: str | Path
     force: Number | None = None
     angle: Number = 0.0
-    noise: Number | None = None
     shift: bool = True
     columns: dict[str, np.ndarray] = field(init=False, repr=False)
     _lines: list[int] = field(init=False, repr=False)
@@ -134,8 +130,7 @@ class MeasuredTest:
         if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
             given = f"force: {self.force!r}; give that of the field of a beam in '{self.file}'"
             raise ValueError(f"{given}, such as '400 N', else none")
-        for name, value, kind in (("force", self.force, "force"), ("noise", self.noise, "length")):
-            put(self, **{name: None if value is None else positive(value, kind, name)})
+        put(self, force=None if self.force is None else positive(self.force, "force", "force"))
 
 
 def stated(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
@@ -174,7 +169,7 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
     factors, label = np.full(values.size, test.force or 1.0), f"field of '{test.file}'"
-    return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], test.noise, points)]
+    return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], points)]
 
 
 def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
@@ -190,7 +185,7 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
     factors = loads / np.hypot(*load.tractions[0].force)
     shifts = np.full((len(loads), int(test.shift)), len(loads) ** -0.5)
     return [
-        Block(f"{name} of {where}", values, factors, _row(test, name, family, load)[None], shifts, test.noise, loads)
+        Block(f"{name} of {where}", values, factors, _row(test, name, family, load)[None], shifts, loads)
         for name, values in test.columns.items()
         if name != "force"
     ]

@@ -18,20 +18,7 @@ LEAST_COVERED = 0.9
 
 
 def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
-    """Refuse a mesh of another shape, or with other groups: the reference is on the outline.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> steel = {"": st.Material("210 GPa", 0.3)}
-    >>> plates = [st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle((0.05, 0.02), r)]) for r in (5e-3, 6e-3)]
-    >>> check_meshed(plates[0], st.mesh_shape(plates[0], "5 mm"), steel)
-    >>> try:
-    ...     check_meshed(plates[0], st.mesh_shape(plates[1], "5 mm"), steel)
-    ... except ValueError as error:
-    ...     print(error)
-    mesh: its outline has a particle at (56, 20) mm, on no side of shape '100x40'; mesh it with springtune.mesh_shape
-    """
+    """Refuse a mesh of another shape, or with other groups: the reference is on the outline."""
     if not shape.outline:
         return
     what, remedy = f"shape {shape.name!r}", "mesh it with springtune.mesh_shape"

@@ -95,11 +95,10 @@ def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
 
 @dataclass(frozen=True)
 class Solution:
-    """An equilibrium of a network, judged.
+    """An equilibrium of a network, judged: NaN without one.
 
-    `load` is the factor of the loading over the reference stiffness. `displacement` is that of the load [m], or the
-    first quantity of a load case. `negative_pivots` counts negative eigenvalues of the tangent. Both are NaN without
-    equilibrium.
+    `load` is the factor of the loading over the reference stiffness, `displacement` that of the load [m] or the first
+    quantity of a load case, `negative_pivots` the number of negative eigenvalues of the tangent.
     """
 
     problem: StaticProblem
@@ -122,34 +121,12 @@ def solved(
 
 
 class Sheet:
-    """A meshed sheet of a thickness [m], on which scenes are solved.
+    """Cache of a meshed sheet of a thickness [m], on which scenes are solved.
 
-    Networks that differ in their reference stiffness alone are assembled and factorized once; networks with the same
-    directions held share their numbering of unknowns; the springs derived last are kept for further loads.
-
-    Attributes
-    ----------
-    weights, measured, loading, loaded : callable
-        Of a kind of load, see `springtune.problem.boundary`; each computed once.
-    filled : set of Beam
-        Beams that the mesh is known to fill.
-    deriving : float
-        Seconds spent on deriving springs so far.
-    networks : int
-        Networks that are kept at a time.
-    references : dict
-        Solved references of load cases of a shape.
-
-    Examples
-    --------
-    >>> from springtune.mesh import MESH_TYPES
-    >>> from springtune.problem.loads import LOADS
-    >>> from springtune.problem.materials import Material
-    >>> sheet = Sheet(MESH_TYPES["structured"](0.1, 0.02, 5e-3), 1e-3)
-    >>> springs, _ = sheet.derive("lattice", Material(210e9, 0.3))
-    >>> found = sheet.solve(LOADS["traction"].kind, springs, 20e3, "linear")
-    >>> f"{found.status}: {1e3 * found.displacement:.3f} mm"
-    'solved: 0.447 mm'
+    Networks that differ in their reference stiffness alone are assembled and factorized once, `networks` of them are
+    kept; networks with the same directions held share their numbering of unknowns; the springs derived last are kept
+    for further loads. `weights`, `measured`, `loading` and `loaded` are those of `springtune.problem.boundary` by kind
+    of load, `filled` the beams that the mesh is known to fill, `references` those of load cases of a shape.
     """
 
     def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
@@ -174,11 +151,10 @@ class Sheet:
         case: tuple[LoadKind | Loading, float, np.ndarray | None] | None = None,
         grouped: GroupedMesh | None = None,
     ) -> tuple[Springs, float]:
-        """Springs of a definition, and the seconds that deriving them took; the last ones are kept.
+        """Derive the springs of a definition; return them and the seconds that this took. The last ones are kept.
 
         A mapping has the materials by part of `grouped`. `case`, for definitions that are fitted to cases, is the load,
-        its factor and the wanted displacements for a factor of 1, or None if there are none; by default the definition
-        is fitted to even tension and shear of the mesh itself.
+        its factor and the wanted displacements for a factor of 1, or None without; by default even tension and shear.
         """
         definition = definition_of(definition)
         by_part = material if isinstance(material, Mapping) else {"": material}

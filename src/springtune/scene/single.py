@@ -31,8 +31,7 @@ from .statements import BeamStatement, ShapeStatement, Statement
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..mechanics.dynamics import Motion, Run
-    from ..mechanics.integrators import BackwardEuler
+    from ..mechanics.dynamics import Motion
     from .statements import AnyReference
 
 
@@ -105,11 +104,19 @@ class Scene(Tabled):
     >>> scene = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="patch")
     >>> scene
     Scene(200x40 mm, 415 particles, steel, traction of 400000 N, patch, nonlinear)
-    >>> len(scene.springs.relative), scene.network.held.sum().item(), scene.objection
-    (1143, 20, '')
+    >>> scene.title, scene.held.sum().item(), scene.network.unknowns, scene.forces.sum(axis=0).round(3).tolist()
+    ('traction of 400000 N', 20, 810, [400000.0, 0.0])
+    >>> scene.finite_strain, scene.objection, round(scene.displacement_of(0.01 * mesh.points), 12)
+    (False, '', 0.002)
+    >>> scene.springs.write("net.csv")[0].name
+    'net.csv'
     >>> result = scene.solve()
     >>> print(f"{result.status}: {1e3 * result.displacement:.2f} mm, error {100 * result.error:+.1f} %")
     solved: 9.51 mm, error +0.1 %
+    >>> {name: f"{1e3 * value:.2f} mm" for name, value in scene.reference_values().items()}
+    {'displacement': '9.50 mm'}
+    >>> scene.write("compressed.vtu", -result.displacements)[0].name
+    'compressed.vtu'
 
     A shape, with the stress beside its hole:
 
@@ -186,38 +193,21 @@ class Scene(Tabled):
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
         with named(self.definition):
-            return self.statement.springs(self.sheet, self.definition, self.uniform_stiffness)
+            return self.statement.springs(self.definition, self.uniform_stiffness)
 
     @cached_property
     def springs(self) -> "SceneSprings":
-        """Springs of the definition: stiffnesses over a reference stiffness, and energies besides them.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
-        >>> [path.name for path in scene.springs.write("net.csv")]
-        ['net.csv', 'net.particles.csv', 'net.triangles.csv']
-        """
+        """Springs of the definition: stiffnesses over a reference stiffness, and energies besides them."""
         springs = self._derived[0]
         return SceneSprings(**{part.name: getattr(springs, part.name) for part in fields(Springs)}, scene=self)
 
     @property
     def title(self) -> str:
-        """Load in words.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN").title
-        'traction of 400000 N'
-        """
+        """Load in words."""
         return self.statement.label
 
     def displacement_of(self, displacements: np.ndarray) -> float:
-        """Displacement of the load, of a shape the first one that its load case asks for.
+        """Displacement of the load [m]; of a shape the first one that its load case asks for, NaN where there is none.
 
         Parameters
         ----------
@@ -227,45 +217,18 @@ class Scene(Tabled):
         Returns
         -------
         float
-            [m]; NaN where the load case asks for none.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
-        >>> scene.displacement_of(0.01 * scene.mesh.points).__round__(12)
-        0.002
         """
         return self.statement.displacement(displacements)
 
     @property
     def held(self) -> np.ndarray:
-        """Directions of the particles that are held, shape (n_points, 2).
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
-        >>> scene.held.sum().item()
-        20
-        """
+        """Directions of the particles that are held, shape (n_points, 2)."""
         return self.statement.loading.held
 
     @property
     def forces(self) -> np.ndarray:
-        """Forces of the load on the particles at rest [N], shape (n_points, 2).
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
-        >>> scene.forces.sum(axis=0).round(6).tolist()
-        [400000.0, 0.0]
-        """
-        return self.statement.forces(self.sheet, self.springs)
+        """Forces of the load on the particles at rest [N], shape (n_points, 2)."""
+        return self.statement.forces(self.springs)
 
     @property
     def network(self) -> Network:
@@ -278,7 +241,7 @@ class Scene(Tabled):
         return self.sheet.problem(self.statement.loading, self.springs)
 
     def solve(self) -> "Result":
-        """Equilibrium under the force.
+        """Solve the equilibrium under the force.
 
         Returns
         -------
@@ -289,23 +252,12 @@ class Scene(Tabled):
         ------
         DefinitionError
             If the definition does not support the mesh or the material.
-
-        Examples
-        --------
-        A cantilever; a slender one gives way by F L^3 / (3 E I) = 0.381 mm:
-
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "20 mm"), st.Material("210 GPa", 0.3)
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "2 mm"), steel, "bending", "20 N")
-        >>> result = scene.solve()
-        >>> print(f"{result.status}: {1e3 * result.displacement:.4f} mm")
-        solved: 0.3780 mm
         """
         begin, derived = time.perf_counter(), None
         try:
             springs, derived = self._derived
             begin = time.perf_counter()
-            solution = self.statement.solve(self.sheet, springs)
+            solution = self.statement.solve(springs)
         except SingularError as error:  # of the network, or of the patch test that scales springs
             seconds = time.perf_counter() - begin
             times = (0.0, seconds) if derived is None else (seconds, derived)
@@ -328,26 +280,16 @@ class Scene(Tabled):
 
         That of a nonlinear `neo-hooke` or `yeoh` network; on a shape also that of `delingette` where small strain does
         not apply.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, rubber = st.Beam("100 mm", "20 mm"), st.Material("1 MPa", 0.5)
-        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
-        >>> pulls = [st.Scene(beam, mesh, rubber, "traction", "10 N", definition=name, kinematics=kinematics)
-        ...          for name in ("neo-hooke", "delingette") for kinematics in ("nonlinear", "linear")]
-        >>> [scene.finite_strain for scene in pulls]
-        [True, False, False, False]
         """
         return bool(self._law)
 
     @cached_property
     def _law(self) -> str:
         """Law at finite strain of the reference, or none."""
-        return self.statement.law(self.sheet, self.definition)
+        return self.statement.law(self.definition)
 
     def reference(self) -> "AnyReference":
-        """Converged finite-element solution under the same force or load case.
+        """Solve finite elements under the same force or load case until they converge.
 
         In small strain, or at finite strain (`finite_strain`): of a `springtune.Rubber` by its own law, of another
         material by neo-Hooke's, of a `delingette` network by St. Venant and Kirchhoff's.
@@ -360,13 +302,6 @@ class Scene(Tabled):
         ------
         ReferenceNotConvergedError
             If its error estimate stays above the tolerance, or there is no equilibrium at finite strain.
-
-        Notes
-        -----
-        In small strain by the hp version of finite elements, whose error falls exponentially and is estimated; see
-        `springtune.reference.small_strain`. At finite strain of a beam by quadratic elements on two meshes, see
-        `springtune.reference.finite_strain`; of a shape by levels as in small strain, see
-        `springtune.reference.finite_shapes`.
 
         Examples
         --------
@@ -384,30 +319,16 @@ class Scene(Tabled):
         >>> print(f"{1e3 * scene.reference().displacement:.0f} mm, error {100 * scene.solve().error:+.1f} %")
         64 mm, error -0.1 %
         """
-        return self.statement.reference(self.sheet, self._law)
+        return self.statement.reference(self._law)
 
     def reference_values(self) -> dict[str, float]:
-        """Quantities of interest of the reference by name.
+        """Quantities of interest of the reference by name, in SI units.
 
         Returns
         -------
         dict of str to float
-            In SI units.
-
-        Raises
-        ------
-        ReferenceNotConvergedError
-            If its error estimate stays above the tolerance.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
-        >>> {name: f"{1e3 * value:.2f} mm" for name, value in scene.reference_values().items()}
-        {'displacement': '9.50 mm'}
         """
-        return self.statement.reference_values(self.sheet, self._law)
+        return self.statement.reference_values(self._law)
 
     @property
     def objection(self) -> str:
@@ -415,10 +336,10 @@ class Scene(Tabled):
 
         Empty where it does, as in linear kinematics, and where the reference is one at finite strain.
         """
-        return "" if self.kinematics == "linear" or self.finite_strain else self.statement.objection(self.sheet)
+        return "" if self.kinematics == "linear" or self.finite_strain else self.statement.objection()
 
     def motion(self, released: bool = False, **options: Any) -> "Motion":
-        """The scene in time, its force switched on at rest and kept; free of damping.
+        """Motion of the scene from rest, its force switched on and kept; free of damping.
 
         Parameters
         ----------
@@ -437,11 +358,6 @@ class Scene(Tabled):
             If the material has no density, or the load prescribes displacements or turns with the sides it acts on.
             Turning loads can be released.
 
-        Notes
-        -----
-        Masses are lumped: each particle has its share of its cells'. The largest stable step of an undamped explicit
-        scheme is 2 over the highest frequency; see `springtune.mechanics.dynamics`.
-
         Examples
         --------
         >>> import springtune as st
@@ -449,17 +365,6 @@ class Scene(Tabled):
         >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "1 kN")
         >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
         622 ns
-
-        Let go of, a bent beam has the work of the force as energy, and comes back to rest where it is damped:
-
-        >>> scene = st.Scene(beam, scene.mesh, steel, "bending", "100 N", kinematics="linear")
-        >>> bent, motion = scene.solve(), scene.motion(released=True)
-        >>> energy = motion.energy(bent.displacements, 0 * bent.displacements)
-        >>> print(f"{1e3 * energy:.3f} mJ, {1e3 * scene.force * bent.displacement / 2:.3f} mJ")
-        11.449 mJ, 11.449 mJ
-        >>> calm = scene.motion(released=True, mass_damping=scene.motion().critical_damping)
-        >>> calm.run("backward-euler", 1e-5, 1000, start=bent.displacements, rest=1e-6).status
-        'rest'
         """
         inertia = self.statement.masses()
         if inertia is None:
@@ -477,60 +382,28 @@ class Scene(Tabled):
         known: dict[str, Any] = {"linear": self.kinematics == "linear", "load": load, "reference": reference}
         return Motion(self.network, inertia / reference, **(known | options))
 
-    def write_motion(
-        self,
-        path: str | Path,
-        motion: "Motion",
-        integrator: "str | BackwardEuler",
-        step: float,
-        steps: int,
-        *,
-        frames: int = 50,
-        **options: Any,
-    ) -> "Run":
-        """Move, and write the network as it moves, for ParaView.
+    def write(self, path: str | Path, displacements: np.ndarray) -> list[Path]:
+        """Write the network at some displacements as VTU, for ParaView and others.
 
         Parameters
         ----------
         path : str or Path
-            Ending in ``.pvd``: a collection of files that stand in the folder of its name, such as
-            ``swing/swing_0000.vtu``, each with displacement, velocity, and stiffness and force of the springs.
-        motion : Motion
-            What `motion` gave, critically damped or not.
-        integrator : str or BackwardEuler
-            As `springtune.mechanics.dynamics.Motion.run` takes it.
-        step : float
-            [s]
-        steps : int
-        frames : int, optional
-            About so many files besides the first.
-        **options
-            As `springtune.mechanics.dynamics.Motion.run` takes them.
+            Ending in ``.vtu``; ParaView opens files with numbers in their names as one that changes in time.
+        displacements : ndarray of float, shape (n_points, 2)
+            Of the particles [m].
 
         Returns
         -------
-        Run
-            How it ended.
+        list of Path
+            What was written.
 
         Raises
         ------
         ValueError
-            If the name has another ending, its folder is not there, a number is out of its range, or the motion
-            diverged; nothing is written then.
-
-        Examples
-        --------
-        >>> from pathlib import Path
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
-        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "bending", "100 N")
-        >>> motion = scene.motion()
-        >>> step = 0.9 * motion.step_limit("central-difference")
-        >>> run = scene.write_motion("swing.pvd", motion, "central-difference", step, 1000, frames=20)
-        >>> run.status, len(list(Path("swing").iterdir()))
-        ('moving', 21)
+            If the name has another ending, or its folder is not there.
         """
-        return hook("writing").write_motion(path, self, motion, integrator, step, steps, frames, **options)
+        written: list[Path] = hook("files").write_displaced(path, self, displacements, compared=False)
+        return written
 
     def buckling_load(self) -> float:
         """Size of the force at which the path from rest bifurcates, or would if it did not bend before.
@@ -552,11 +425,6 @@ class Scene(Tabled):
             If nothing bifurcates: a column on a mesh that is no mirror image, such as ``free``, ``right`` or some
             ``structured`` ones, bends from the first load on and stays stable. The force is then that of the nearly
             perfect column.
-
-        Notes
-        -----
-        By linear buckling analyses about equilibria shortly below it, proved by the tangent's pivots in equilibria on
-        both sides; see `springtune.mechanics.continuation.buckling`.
 
         Examples
         --------
@@ -588,7 +456,7 @@ class SceneSprings(Springs):
 
     def write(self, path: str | Path, **options: Any) -> list[Path]:
         """Write the springs for another program, see `springtune.SpringNet`."""
-        return hook("writing").write_springs(path, self.scene, self, **options)
+        return hook("files").write_springs(path, self.scene, self, **options)
 
 
 @dataclass(frozen=True, repr=False)
@@ -626,8 +494,10 @@ class Result(Tabled):
     (<Status.SOLVED: 1>, '', 0)
     >>> print(f"{1e3 * result.displacement:.2f} mm, by finite elements {1e3 * result.reference().displacement:.2f} mm")
     9.83 mm, by finite elements 9.50 mm
-    >>> print(f"error {100 * result.error:+.2f} %")
-    error +3.52 %
+    >>> print(f"error {100 * result.error:+.2f} %, {result.sign_word}", result.sign_words, list(result.errors))
+    error +3.52 %, too soft {'displacement': 'too soft'} ['displacement']
+    >>> result.write("traction.vtu")[0].name, result.plot().get_title(loc="left")
+    ('traction.vtu', 'traction of 400000 N: 9.832 mm')
     >>> result.displacements.shape, result.stiffness.shape, result.spring_forces.shape
     ((415, 2), (1143,), (1143,))
     >>> print(f"{result.stiffness.max():.4g} N/m, at most {1e-3 * result.spring_forces.max():.1f} kN in a spring")
@@ -704,11 +574,6 @@ class Result(Tabled):
         Returns
         -------
         ReferenceSolution, FiniteStrainSolution or ShapeReference
-
-        Raises
-        ------
-        ReferenceNotConvergedError
-            If its error estimate stays above the tolerance.
         """
         return self.scene.reference()
 
@@ -723,19 +588,7 @@ class Result(Tabled):
 
     @property
     def errors(self) -> dict[str, float]:
-        """As `error`, of each quantity of interest [1]; NaN where the reference has none of it, or exactly zero.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
-        >>> result = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="lattice").solve()
-        >>> {name: f"{100 * error:+.2f} %" for name, error in result.errors.items()}
-        {'displacement': '+3.52 %'}
-        >>> result.values.keys() == result.errors.keys()
-        True
-        """
+        """As `error`, of each quantity of interest [1]; NaN where the reference has none of it, or exactly zero."""
         return quantity_errors(self.values, self.scene.reference_values())
 
     @property
@@ -743,15 +596,6 @@ class Result(Tabled):
         """What the sign of `error` means: ``"too soft"`` or ``"too stiff"``; empty without an error.
 
         Of a quantity other than a displacement ``"too large"`` or ``"too small"``.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
-        >>> result = st.Scene(beam, mesh, steel, "compression", "40 kN", definition="lattice").solve()
-        >>> f"{100 * result.error:+.2f} %, {result.sign_word}", result.sign_words
-        ('-3.59 %, too soft', {'displacement': 'too soft'})
         """
         return next(iter(self.sign_words.values()))
 
@@ -762,17 +606,14 @@ class Result(Tabled):
         kinds = {one.name: one.kind for one in self.scene.statement.case.quantities}
         return {name: sign_word(error, known.get(name, np.nan), kinds[name]) for name, error in self.errors.items()}
 
-    def write(self, path: str | Path, steps: int = 10) -> list[Path]:
+    def write(self, path: str | Path) -> list[Path]:
         """Write the deformed network as VTU, for ParaView and others.
 
         Parameters
         ----------
         path : str or Path
-            ``.vtu``: particles with displacement, that of the reference and the difference (``error``), springs as
-            lines with stiffness and force, cells. ``.pvd``: the path to it from rest, in equal steps of the force, as a
-            collection of such files in the folder of its name, whose times are the size of the force [N].
-        steps : int, optional
-            Of a path.
+            Ending in ``.vtu``: particles with displacement, that of the reference and the difference (``error``),
+            springs as lines with stiffness and force, cells.
 
         Returns
         -------
@@ -783,16 +624,11 @@ class Result(Tabled):
         ------
         ValueError
             If the name has another ending, its folder is not there, or there is no equilibrium.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> result = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN").solve()
-        >>> result.write("traction.vtu")[0].name, len(result.write("traction.pvd", steps=4))
-        ('traction.vtu', 6)
         """
-        return hook("writing").write_result(path, self, steps)
+        if not np.isfinite(self.displacement):
+            raise ValueError(f"there is no equilibrium to write: {self.message}")
+        written: list[Path] = hook("files").write_displaced(path, self.scene, self.displacements, compared=True)
+        return written
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the deformed springs, coloured by their force.
@@ -810,15 +646,6 @@ class Result(Tabled):
         ------
         ValueError
             If there is no equilibrium.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
-        >>> axes = st.Scene(beam, mesh, steel, "traction", "400 kN").solve().plot()
-        >>> axes.get_title(loc="left")
-        'traction of 400000 N: 9.508 mm'
         """
         if not np.isfinite(self.displacement):
             raise ValueError(f"there is no equilibrium to draw: {self.message}")

@@ -87,32 +87,32 @@ class Statement(ABC):
         """Refuse a definition that is not for the body or the load."""
 
     @abstractmethod
-    def reference(self, sheet: Sheet, law: str = "") -> "AnyReference":
+    def reference(self, law: str = "") -> "AnyReference":
         """Converged finite-element solution, in small strain or of a law at finite strain."""
 
-    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
+    def reference_values(self, law: str = "") -> dict[str, float]:
         """Quantities of interest of the reference."""
-        return dict(cast("ShapeReference", self.reference(sheet, law)).values)
+        return dict(cast("ShapeReference", self.reference(law)).values)
 
-    def law(self, sheet: Sheet, definition: Definition) -> str:
+    def law(self, definition: Definition) -> str:
         """Law at finite strain of the reference of a definition's network; none of small strain."""
         return definition.law if self.kinematics == "nonlinear" else ""
 
-    def objection(self, sheet: Sheet) -> str:
+    def objection(self) -> str:
         """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
-        found = cast("ReferenceSolution | ShapeReference", self.reference(sheet))
+        found = cast("ReferenceSolution | ShapeReference", self.reference())
         return beyond_linear(found.rotation, found.strain)
 
-    def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
+    def springs(self, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
         case = None
         if definition.needs == "cases":
-            case = self.loading, self.force, self.reference(sheet).at(self.mesh.points) / self.force
-        return sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
+            case = self.loading, self.force, self.reference().at(self.mesh.points) / self.force
+        return self.sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
 
-    def forces(self, sheet: Sheet, springs: Springs) -> np.ndarray:
+    def forces(self, springs: Springs) -> np.ndarray:
         """Forces on the particles at rest [N], shape (n_points, 2)."""
-        return self.force * sheet.pattern(self.loading, springs)
+        return self.force * self.sheet.pattern(self.loading, springs)
 
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
@@ -123,9 +123,9 @@ class Statement(ABC):
         """Factor of the loading over the reference stiffness."""
         return self.force / springs.reference
 
-    def solve(self, sheet: Sheet, springs: Springs) -> Solution:
+    def solve(self, springs: Springs) -> Solution:
         """Equilibrium, judged; its displacement is the first quantity of interest."""
-        problem, first = sheet.problem(self.loading, springs), self.case.quantities[0]
+        problem, first = self.sheet.problem(self.loading, springs), self.case.quantities[0]
         return solved(
             problem,
             self.factor(springs),
@@ -227,17 +227,17 @@ class BeamStatement(Statement):
         density = self.material.density
         return None if density is None else density * self.thickness * self.mesh.particle_areas
 
-    def reference(self, sheet: Sheet, law: str = "") -> "ReferenceSolution | FiniteStrainSolution":
+    def reference(self, law: str = "") -> "ReferenceSolution | FiniteStrainSolution":
         """Converged finite-element solution, in small strain or of the material's law at finite strain."""
         if law:
             return _solve_finite(self.beam, self.material, self.force, self.kind, self.follower)
         return unit_reference(self.beam, self.material, self.kind, self.force)
 
-    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
+    def reference_values(self, law: str = "") -> dict[str, float]:
         """Displacement of the reference [m]."""
-        return {"displacement": self.reference(sheet, law).displacement}
+        return {"displacement": self.reference(law).displacement}
 
-    def law(self, sheet: Sheet, definition: Definition) -> str:
+    def law(self, definition: Definition) -> str:
         """Law of the reference: of beams that of rubber alone."""
         return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
 
@@ -326,20 +326,20 @@ class ShapeStatement(Statement):
             why = f"is for forces, and load {self.load!r} prescribes displacements"
             raise ValueError(f"definition: {definition.name!r} {why}; choose another definition")
 
-    def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
+    def springs(self, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
-        springs, seconds = super().springs(sheet, definition, stiffness)
+        springs, seconds = super().springs(definition, stiffness)
         if springs.lateral:
             raise DefinitionError("needs a stress on the long faces of a beam; choose another definition")
         return springs, seconds
 
-    def reference(self, sheet: Sheet, law: str = "") -> "ShapeReference":
+    def reference(self, law: str = "") -> "ShapeReference":
         """Converged finite-element solution, once for all scenes of a sheet."""
         case = self.case if law else self.shape.loads[self.load]
         as_read = self.grouped if self.shape.file else None
         # The shape is kept too, so that its id is not used again.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items()), law
-        if key not in sheet.references:
+        if key not in self.sheet.references:
             if law:
                 from ..reference.finite_shapes import solve_finite_shape  # here, as below
 
@@ -348,14 +348,14 @@ class ShapeStatement(Statement):
                 from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
 
                 found = solve_shape(self.shape, case, self.by_part, as_read)
-            sheet.references[key] = self.shape, found
-        reference: ShapeReference = sheet.references[key][1]
+            self.sheet.references[key] = self.shape, found
+        reference: ShapeReference = self.sheet.references[key][1]
         return reference if law or self.scale == 1 else reference.scaled(self.scale)
 
-    def law(self, sheet: Sheet, definition: Definition) -> str:
+    def law(self, definition: Definition) -> str:
         """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
-        law = super().law(sheet, definition)
-        return "" if law == "st-venant" and not self.objection(sheet) else law
+        law = super().law(definition)
+        return "" if law == "st-venant" and not self.objection() else law
 
 
 def sheet_of(mesh: Mesh, thickness: float, sheet: Sheet | None) -> Sheet:

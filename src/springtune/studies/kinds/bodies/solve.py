@@ -84,7 +84,7 @@ def solve(task, solve_one):
 def _solved(about, springs, seconds, task):
     """Equilibrium of a scene, with what is stored of each scene, and the arrays of one that is drawn."""
     begin = time.perf_counter()
-    found = about.solve(about.sheet, springs)
+    found = about.solve(springs)
     result = {
         "status": found.status,
         "message": found.message,
@@ -165,7 +165,7 @@ def solve_shape(described, grouped, sheets, task):
         about.check(definition)
         sheets[shape.thickness] = about.sheet
         with named(definition):
-            springs, seconds = about.springs(about.sheet, definition, None)
+            springs, seconds = about.springs(definition, None)
         solution, result = _solved(about, springs, seconds, task)
     # Loads on what is held, quantities that the mesh has not, definitions that refuse it; mechanisms.
     except (ValueError, SingularError) as error:
