@@ -14,7 +14,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from ..handover.net import SpringNet
 from ..linalg.factors import SUPERLU
-from ..mechanics.kernels import compiled
+from ..linalg.kernels import compiled
 from .base import Setting, engine
 from .textbook import Textbook, pulling, spring_between, stretch_spring
 

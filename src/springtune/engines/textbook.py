@@ -10,7 +10,7 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..handover.simulation import WORDS
 from ..handover.terms import VALUES
-from ..mechanics.kernels import compiled
+from ..linalg.kernels import compiled
 from .base import SPRING, EngineError, Parameter, Setting
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..mechanics.kernels import compiled
+from ..linalg.kernels import compiled
 from ..mesh.cells import no_cells
 from .base import Setting, engine
 from .textbook import Textbook, as_they_are, pulling

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
-from ..mechanics.kernels import compiled
+from ..linalg.kernels import compiled
 from .base import EngineError, Parameter, Setting, engine
 from .textbook import Textbook, project_springs
 
