@@ -364,7 +364,8 @@ def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
     """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
     known = {key: math.nan if one["value"] is None else one["value"] for key, one in found.items()}
     try:
-        return float(FORMULAS.compile_expression(text, undefined_to_none=False)(**known))
+        value: Any = FORMULAS.compile_expression(text, undefined_to_none=False)(**known)
+        return float(value)
     except (TemplateError, ArithmeticError, TypeError, ValueError) as error:
         raise PaperError(
             f"{name}: the formula '{text}' cannot be computed: {error}; give numbers that are declared above, "
