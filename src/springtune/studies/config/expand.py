@@ -1,4 +1,4 @@
-"""Expand the sections of a study into meshes, scenes and curves."""
+"""Load a study from YAML: validate it, and expand its sections into meshes, scenes and curves, each once and sorted."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,21 +11,58 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from springtune.problem.parameters import SWEPT
+from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io.inputs import fault
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from .checks import check_cells, mesh_type_names, stated_rows
-from .combinations import combinations, read_printed
-from .fields import RANGE_DIGITS
+from . import checks
+from .combinations import add_rows, combinations, read_printed
+from .fields import FILES, RANGE_DIGITS
 from .kind import Kind
-from .messages import Problems
+from .messages import Problems, StudyError, read_study, validated
 from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study
-from .sections import StudyConfig
+from .sections import StudyConfig, study_model
 
 Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 
 FROM_THE_STUDY = "give its path relative to the study's folder"
+
+
+def load(path: str | Path, kinds: tuple[Kind, ...]) -> Study:
+    """Read, validate and expand a study."""
+    path, file = Path(path), str(path)
+    text, content, lines = read_study(path)
+    if not NAME.fullmatch(path.stem):
+        raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
+    problems = Problems(file, lines, content, path.parent)
+    model = study_model(kinds)
+    if content is None:
+        problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
+    files: list[str] = []
+    add_rows(content, problems, files)
+    # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
+    given = content.items() if isinstance(content, dict) else ()
+    sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: files}
+    config = validated(model, content, problems, context=sections)
+    checks.check_names(config, problems)
+    problems.stop()
+    checks.check_scenes(config, problems)
+    problems.stop()
+    for kind in filter(lambda kind: kind.wanted(config), kinds):
+        kind.check(config, problems)
+    problems.stop()
+    bodies = declared(config, problems)
+    mesh_files = files_of_meshes(config, bodies.beams, problems)
+    grids = expand(config, bodies, mesh_files, problems)
+    checks.check_meshes(config, grids, problems)
+    problems.stop()
+    checks.check_definitions(config, grids, problems)
+    problems.stop()
+    printed_path = path.parent / config.printed if config.printed else None
+    about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
+    about["files"] = tuple(path.parent / name for name in files)
+    return build(config, bodies, grids, kinds, problems, about)
 
 
 def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Problems) -> MeshFiles:
@@ -70,7 +107,7 @@ def _ranks(config: StudyConfig) -> dict[str, dict[str, int]]:
     """Rank of each label, by dimension."""
     names: dict[str, Iterable[str]] = {
         "beam": config.beams,
-        "mesh_type": mesh_type_names(config),
+        "mesh_type": checks.mesh_type_names(config),
         "material": config.materials,
         "load": LOADS,
         "definition": DEFINITIONS,
@@ -207,7 +244,7 @@ def build(
             used[name].add(label)
     for name in {"definition", "kinematics", "stiffness_scale"} & used.keys():
         used[name] = {getattr(scene, name) for scene in scenes}
-    check_cells(config, used, bool(curves), problems)
+    checks.check_cells(config, used, bool(curves), problems)
     problems.stop()
     parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
@@ -232,9 +269,11 @@ def build(
         parts=parts,
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
-        stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},
+        stiffness_table={(row.mesh_type, row.material): row.value for row in checks.stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
-        printed=read_printed(about["printed_path"], mesh_type_names(config), problems) if about["printed_path"] else (),
+        printed=read_printed(about["printed_path"], checks.mesh_type_names(config), problems)
+        if about["printed_path"]
+        else (),
         axes=_axes(ranks, used, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
         swept=names,
         **about,

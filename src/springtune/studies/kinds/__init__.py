@@ -36,6 +36,6 @@ def load_study(path: str | Path) -> "Study":
     >>> study.axes["mesh_size"]
     (0.001, 0.002, 0.005)
     """
-    from ..config.load import load  # here, since pydantic takes a fifth of a second to import
+    from ..config.expand import load  # here, since pydantic takes a fifth of a second to import
 
     return load(path, kinds())

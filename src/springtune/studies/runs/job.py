@@ -45,8 +45,8 @@ def _note(tasks: str, digest: str) -> dict[str, Any]:
 
 def _plan(study: str, folder: Path) -> None:
     """Write the notes of all jobs of a study."""
+    from ..config.expand import load
     from ..config.kind import kinds  # here: a run has written them
-    from ..config.load import load
     from .plan import plan
 
     for job in plan(load(study, kinds()), folder).values():
