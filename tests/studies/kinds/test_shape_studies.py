@@ -182,7 +182,7 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     [
         ("right", "rihgt", ["shapes.plate.loads.pull", "no group is named 'rihgt'; did you mean 'right'?"]),
         ("left: fixed", "left: {x: 0}", ["supports leave the body free to"]),
-        ("plate.vtu", "no.vtu", ["is not a file; give its path relative to the study's folder"]),
+        ("plate.vtu", "no.vtu", ["No such file or directory; give its path relative to the study's folder"]),
         ("definition:", "mesh_size: 5 mm\n    definition:", ["'plate' is a mesh file, which has its own; remove it"]),
         ("    file:", "    parts: {core: steel}\n    file:", ["unknown part 'core'; the file has none"]),
     ],

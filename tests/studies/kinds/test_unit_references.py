@@ -6,9 +6,9 @@ import pytest
 from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies import any_reference, collect
+from springtune.studies.kinds.bodies import plan as bodies_plan
 from springtune.studies.kinds.bodies.kind import summary
 from springtune.studies.kinds.bodies.plan import (
-    expected_solves,
     interpolants,
     reference_of,
     solved_reference,
@@ -19,6 +19,11 @@ from springtune.studies.runs.plan import plan
 from campaigns import do_stages
 
 MANY, FEW = 32, 20
+
+
+@pytest.fixture(autouse=True)
+def few_alone(monkeypatch):
+    monkeypatch.setattr(bodies_plan, "MOST_ALONE", 25)
 
 
 def text(lengths, outputs="[size]", definition="lattice", more=""):
@@ -66,9 +71,8 @@ def test_many_references_come_from_an_interpolant(load):
     study = load(lengths(MANY))
     box, problems = interpolants(study)["axial"]
     assert (len(problems), box) == (MANY, ((1.995262, 3.162278), (0.3, 0.3)))
-    assert MANY > expected_solves(box)
     assert len({one["interpolant"] for one in references(study)}) == 1
-    assert f"from about {expected_solves(box)} solutions and interpolation" in summary(study, [])
+    assert "from 1 interpolant: " in summary(study, [])
 
 
 def test_values_added_inside_the_box_leave_the_interpolant_as_it_is(load):

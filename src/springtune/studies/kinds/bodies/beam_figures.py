@@ -85,36 +85,37 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     )
     curves, root = curves.sel(selection), group(data, "/")
     values = last_swept(curves.status != 0)
-    known = at(root.sel(selection), values) if "reference_displacement" in root else None
+    curves, root = at(curves, values), at(root.sel(selection), values) if "reference_displacement" in root else None
     # The force has a place of its own.
-    words = swept_words({name: value for name, value in values.items() if name != "force" or known is None})
-    return _sensitivity(at(curves, values), known, selection, words, ax)
-
-
-def _sensitivity(curves, root, selection, swept, ax):
+    words = swept_words({name: value for name, value in values.items() if name != "force" or root is None})
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.6))
     unit, written = labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
-    seen = set()
-    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit
-    for number, size in enumerate(curves.mesh_size.values):
-        curve = curves.isel(mesh_size=number)
-        if (curve.status.values != 0).any():
-            seen |= draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
+    known, seen = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit, set()
+    for number, size in enumerate(labels_of(curves.status != 0, "mesh_size")):
+        curve = curves.sel(mesh_size=size)
+        seen |= draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
     if root is not None and int(root.get("reference_applies", 1)) == 0:
         seen.add("beyond")
-    errors = 100 * np.abs(curves.deformation_error.values)
-    highest = np.nanmax(errors, initial=0.0)
-    lowest_of_each = [np.nanmin(one) for one in errors.reshape(-1, errors.shape[-1]) if np.isfinite(one).any()]
-    top = MOST_SHOWN if max(lowest_of_each, default=0) < 0.8 * MOST_SHOWN else 1.1 * highest
-    panel.set(ylim=(0, min(top, 1.1 * highest) if highest else MOST_SHOWN), ylabel="|Deformation error| [%]")
+    errors = 100 * abs(curves.deformation_error)
+    highest, top = float(errors.max()), MOST_SHOWN
+    if errors.min("stiffness_ratio").max() >= 0.8 * MOST_SHOWN:
+        top = 1.1 * highest
+    panel.set(ylim=(0, min(top, 1.1 * highest) if highest > 0 else MOST_SHOWN), ylabel="|Deformation error| [%]")
     panel.set_xlim(*((known.min(), known.max()) if len(known) else (0, 1)))
     panel.set_xlabel(f"Uniform spring stiffness [{written}N/m]")
-    panel.set_title(_sensitivity_title(panel, root, selection, swept), pad=12)
-    if root is not None and "paper_stiffness" in root:
-        _mark_printed(panel, root.paper_stiffness.values, unit)
+    panel.set_title(_sensitivity_title(panel, root, selection, words))
+    printed = root.paper_stiffness.values if root is not None and "paper_stiffness" in root else np.array(np.nan)
+    for value in np.unique(printed[np.isfinite(printed)]) / unit:
+        if panel.get_xlim()[0] < value < panel.get_xlim()[1]:
+            mark_stiffness(panel, value, f"the paper's {value:g}")
     key = [Line2D([], [], color="0.3", label=text, **look) for name, (text, look) in KEY.items() if name in seen]
     labels.finish(panel, why=_why_no_curve(curves), key=key)
     return panel
+
+
+def mark_stiffness(panel, value, name):
+    """Draw a dashed line at a stiffness."""
+    panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1, label=name)
 
 
 def draw_curve(panel, curve, unit, name, look, known):
@@ -161,22 +162,9 @@ def _sensitivity_title(panel, root, selection, swept):
     first = labels.fitted(panel, [", ".join(words)], 8)
     if root is None:
         return first
-    reference = float(root.reference_displacement)
-    text = f"reference {1e3 * reference:.4g} mm".replace("-", "−") if np.isfinite(reference) else "no reference"
-    return f"{first}\n{_force(float(root.force))}, {text}"
-
-
-def _mark_printed(panel, printed, unit):
-    """Mark the paper's stiffness and name it above the panel."""
-    low, high = panel.get_xlim()
-    values = np.unique(printed[np.isfinite(printed)])
-    values = values[(values > low * unit) & (values < high * unit)]
-    for value in values:
-        panel.axvline(value / unit, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1)
-    if len(values):
-        text = "the paper's " + ", ".join(f"{value / unit:g}" for value in values)
-        panel.annotate(text, (values[0] / unit, 1), xycoords=("data", "axes fraction"), xytext=(0, 2), va="bottom",
-                       textcoords="offset points", ha="center", color="0.25", fontsize=style.SMALL)  # fmt: skip
+    force, reference = float(root.force), float(root.reference_displacement)
+    text = f"reference {1e3 * reference:.4g} mm" if np.isfinite(reference) else "no reference"
+    return f"{first}\n{with_unit('force', force) if np.isfinite(force) else 'no force'}, {text}".replace("-", "−")
 
 
 def _why_no_curve(curves):
@@ -185,11 +173,6 @@ def _why_no_curve(curves):
         return "solved, but without a reference there is no error"
     messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
     return "; ".join([f"no stiffness has an error: {in_words(curves.status.values)}", *messages[:1]])
-
-
-def _force(newtons):
-    text = f"{newtons / 1e3:g} kN" if abs(newtons) >= 1e3 else f"{newtons:g} N"
-    return text.replace("-", "−") if np.isfinite(newtons) else "no force"
 
 
 def swept_words(values):
@@ -435,8 +418,7 @@ def _stiffness(panel, curves, root):
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
     stated = networks.stiffness.sel(definition=networks.definition == "paper").values
     for value in np.unique(stated[np.isfinite(stated)]):
-        panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1,
-                      label=f"as stated: {value:.4g}")  # fmt: skip
+        mark_stiffness(panel, value, f"as stated: {value:.4g}")
     return said, ""
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from springtune.mesh.cells import MeshError
 from springtune.problem.geometry import size_text
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem
@@ -17,8 +16,8 @@ from springtune.safe_io.tables import aligned
 
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study
-from .outputs import OUTPUTS, OWN_FILE, mesh_name, stems
-from .plan import STAGES, expected_solves, interpolants, reference_of
+from .outputs import OUTPUTS, mesh_name, stems
+from .plan import STAGES, interpolants, reference_of
 from .shape_sections import SHAPE_GRIDS_KEY, SHAPES_KEY
 
 
@@ -57,7 +56,7 @@ def _size(shape, file):
 
     try:
         sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0)
-    except MeshError as error:
+    except ValueError as error:
         return str(error)
     return f"{size_text(*sides)}, {Path(file).name} in units of {shape.unit:g} m"
 
@@ -66,16 +65,14 @@ def _summary(found):
     shapes = found["shapes"]
     if not shapes:
         return []
-    sizes = Counter((one.shape, one.mesh_size * (one.mesh_type == OWN_FILE)) for one in shapes.scenes)
     cases = {(one.shape, one.load) for one in shapes.scenes}
     quantities = sum(len(shapes.shape[shape].loads[load].quantities) for shape, load in cases)
-    used = {one.shape for one in shapes.scenes}
-    words = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(set(map(mesh_name, shapes.scenes)))} meshes"
+    counts = Counter(one.shape for one in shapes.scenes)
+    words = f"{len(counts)} shape{'s' * (len(counts) > 1)} on {len(set(map(mesh_name, shapes.scenes)))} meshes"
     rows = [["shape scenes", len(shapes.scenes), f"of {words}, {quantities} quantities"]]
-    rows += [
-        [f"  {name}", count, _size(shapes.shape[name], shapes.files[name].get(size, ""))]
-        for (name, size), count in sizes.items()
-    ]
+    for name, count in counts.items():
+        shape, files = shapes.shape[name], shapes.files[name].values()
+        rows += [[f"  {name}", count, "; ".join(_size(shape, file) for file in files or [""])]]
     if count := len(shapes.referred) + len(shapes.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
@@ -129,16 +126,15 @@ def summary(study: Study, further: list[list[object]]) -> str:
 
 def _solutions(study: Study) -> str:
     """Number of finite-element solutions of the references, in words."""
-    known = interpolants(study)
     problems = {
         unit_problem(one.beam, one.material, LOADS[one.load].kind)
         for one in study.references
         if "interpolant" not in reference_of(study, one.beam, one.material, one.load)
     }
-    if not known:
-        return f"{len(problems)} solution{'s' * (len(problems) != 1)}"
-    count = len(problems) + sum(expected_solves(box) for box, _ in known.values())
-    return f"about {count} solutions and interpolation between them"
+    alone, interpolated = len(problems), len(interpolants(study))
+    words = [f"{alone} solution{'s' * (alone != 1)}"] if alone or not interpolated else []
+    words += [f"{interpolated} interpolant{'s' * (interpolated != 1)}"] if interpolated else []
+    return " and ".join(words)
 
 
 def _contributions(study: Study) -> list[list[object]]:

@@ -1,17 +1,17 @@
 """Outputs of scenes, and what the page to browse shows of scenes, curves and references."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
 from ...config.kind import stem as figure_stem
-from ...config.model import once_a_study, swept_value
+from ...config.model import once_a_study
 from ...output.browse import Plot, View, particle_plots
 
 if TYPE_CHECKING:
-    from ...config.model import CurveSpec, SceneSpec, Study
+    from ...config.model import Study
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 """Dimensions of which a figure of sensitivity curves shows one label."""
@@ -61,20 +61,14 @@ def _lack_of_pressure(study: "Study") -> str:
     return "" if pressed(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
 
 
-def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]:
-    for item in items:
-        labels = {"beam": item.mesh.beam.name, "mesh_type": item.mesh.mesh_type}
-        yield labels | {"material": item.material.name, "load": item.load}
-
-
-def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
+def _sweeps(study: "Study") -> dict[str, Mapping[str, object]]:
     """Selections of figures of sweeps by stem: where a parameter has several values."""
-    found: dict[str, Mapping[str, str]] = {}
+    found: dict[str, Mapping[str, object]] = {}
     for name in study.swept:
-        values: dict[tuple[str, ...], set[float]] = {}
-        for scene in study.scenes:
-            place = scene.mesh.mesh_type, scene.material.name, scene.load, scene.kinematics, scene.mesh.beam.name
-            values.setdefault(place, set()).add(swept_value(scene, scene.mesh.beam, name))
+        values: dict[tuple[object, ...], set[object]] = {}
+        for labels in map(study.labels, study.scenes):
+            place = tuple(labels[one] for one in (*SCENE_LABELS, "kinematics", "beam"))
+            values.setdefault(place, set()).add(labels[name])
         several = [dict(zip(SCENE_LABELS, place)) for place, members in values.items() if len(members) > 1]
         found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
     return found
@@ -123,14 +117,14 @@ OUTPUTS = (
     Output(
         "sensitivity",
         "sensitivity curves",
-        figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, _cells(study.curves)),
+        figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, map(study.labels, study.curves)),
         plot=f"{PLOTS}:sensitivity",
         usual=True,
     ),
     Output(
         "size",
         "errors against mesh size",
-        figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
+        figures=lambda study: distinct("size", SCENE_LABELS, map(study.labels, study.scenes)),
         plot=f"{ERROR_PLOTS}:size",
         job="scenes",
         usual=True,
@@ -138,7 +132,7 @@ OUTPUTS = (
     Output(
         "deformed",
         "deformed networks, and the group `/fields`",
-        figures=lambda study: distinct("deformed", SCENE_LABELS, _cells(study.scenes)),
+        figures=lambda study: distinct("deformed", SCENE_LABELS, map(study.labels, study.scenes)),
         plot=f"{PLOTS}:deformed",
         job="scenes",
         usual=True,
@@ -191,22 +185,9 @@ VIEWS = (
             Plot("seconds over particles", "solve_seconds", "particles", "definition", along="mesh_size", log="xy"),
             Plot("what became of the cells", "status", "mesh_size", "definition", "map"),
         ),
-        (
-            "deformation_error",
-            "status",
-            "displacement",
-            "reference_displacement",
-            "field_error",
-            "stiffness",
-            "paper_deformation_error",
-            "paper_displacement",
-            "particles",
-            "solve_seconds",
-            "residual",
-            "message",
-            "reference_message",
-            "paper_remark",
-        ),
+        ("deformation_error", "status", "displacement", "reference_displacement", "field_error", "stiffness",
+         "paper_deformation_error", "paper_displacement", "particles", "solve_seconds", "residual", "message",
+         "reference_message", "paper_remark"),
     ),
     View(
         "/sensitivity",
@@ -235,13 +216,8 @@ VIEWS = (
         "Block",
         "Bodies under pressure: displacements over the loaded face, and the error in its middle.",
         (
-            Plot(
-                "displacement over the face",
-                "face_profile",
-                "face_position",
-                "definition",
-                beside=(("face_position", "reference_face_profile", "reference"),),
-            ),
+            Plot("displacement over the face", "face_profile", "face_position", "definition",
+                 beside=(("face_position", "reference_face_profile", "reference"),)),
             Plot("error of the middle", "face_error", "mesh_size", "definition"),
             Plot("errors of the middle by definition and load", "face_error", "load", "definition", "map"),
             Plot("references over the face", "reference_face_profile", "face_position", "reference"),
@@ -260,16 +236,15 @@ VIEWS = (
         "/shapes",
         "Shapes",
         "Quantities of interest of bodies of any outline: networks beside converged references on the same shape, and "
-        "beside the numbers of others.",
+        "beside published values.",
         (
-            Plot("error over particles", "error", "particles", "definition", along="mesh_size", ascending=True,
-                 log="xy"),
-            Plot("error over seconds", "error", "solve_seconds", "definition", along="mesh_size", ascending=True,
-                 log="xy"),
+            *(Plot(words, value, x, "definition", along="mesh_size", ascending=True, log="xy") for words, value, x in (
+                ("error over particles", "error", "particles"),
+                ("error over seconds", "error", "solve_seconds"),
+                ("difference to published values", "expected_error", "particles"),
+            )),
             Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
             Plot("errors of definitions on shapes", "error", "shape", "definition", "map"),
-            Plot("difference to what others give", "expected_error", "particles", "definition", along="mesh_size",
-                 ascending=True, log="xy"),
             Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
         ),
     ),

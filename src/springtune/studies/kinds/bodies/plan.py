@@ -3,7 +3,7 @@
 import hashlib
 from collections import defaultdict
 from functools import cache, lru_cache
-from math import ceil, floor, log, log10
+from math import ceil, floor, log10
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -75,15 +75,8 @@ def shape_scenes_by_mesh(study):
 #
 # Where that takes fewer solves. An interpolant has no whole fields; references that need one are solved one by one.
 
-NODES_OF_ASPECTS = ((0.5, 5), (1.2, 9), (3.6, 17), (7.0, 33))
-"""Nodes along aspect ratios that interpolants took, by the largest logarithm of the last over the first one. Others
-took up to 65."""
-
-NODES_OF_NUS = ((0.1, 5), (0.6, 9))
-"""The same by the largest difference of Poisson's ratios; others took 17."""
-
-CHECKS = 24
-"""Solves that an interpolant is compared with."""
+MOST_ALONE = 100
+"""Unit problems of one kind of load that are solved one by one, some 3 s; more are interpolated."""
 
 ASPECT_STEPS = 10
 """Ends of ranges of aspect ratios: so many in a decade, each 1.26 times the one before. Aspect ratios that are added to
@@ -98,26 +91,19 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
-    bodies = dict.fromkeys((one.beam, one.material, one.load) for one in study.references)
-    if len(bodies) <= CHECKS:
-        return {}
     wanted = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
     if keeps_fields(study):
         wanted += shown_scenes(study)
     # Bodies and loads that share a unit problem share its solution, too.
     whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}
     kinds: dict[str, dict[Body, tuple[float, float]]] = {}
-    for body in bodies:
+    for body in dict.fromkeys((one.beam, one.material, one.load) for one in study.references):
         beam, material, load = body
         aspect_ratio, nu, kind = problem = unit_problem(beam, material, LOADS[load].kind)
         if problem not in whole and kind.mirrored and -1 < nu <= 0.5:
             kinds.setdefault(kind.name, {})[body] = aspect_ratio, nu
-    boxes = {name: box_of(set(problems.values())) for name, problems in kinds.items()}
-    return {
-        name: (boxes[name], problems)
-        for name, problems in kinds.items()
-        if len(set(problems.values())) > expected_solves(boxes[name])
-    }
+    problems = {name: set(own.values()) for name, own in kinds.items()}
+    return {name: (box_of(problems[name]), own) for name, own in kinds.items() if len(problems[name]) > MOST_ALONE}
 
 
 def box_of(problems: set[tuple[float, float]]) -> "Box":
@@ -142,22 +128,6 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
         below, above = (round(step * NU_STEP, 2) for step in steps)
         least, largest = min(least, below) if below > -1 else least, min(max(largest, above), 0.5)
     return (first, last), (least, largest)
-
-
-def expected_solves(box: "Box") -> int:
-    """Approximate number of solves for an interpolant over a box.
-
-    Examples
-    --------
-    >>> expected_solves(((1, 12), (0, 0.5))), expected_solves(((4, 6), (0.3, 0.3)))
-    (177, 29)
-    """
-    (first, last), (least, largest) = box
-    count = 1
-    for width, known, most in ((log(last / first), NODES_OF_ASPECTS, 65), (largest - least, NODES_OF_NUS, 17)):
-        if width:
-            count *= next((nodes for widest, nodes in known if width <= widest), most)
-    return count + CHECKS
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -481,7 +451,7 @@ def _reference_tasks(study):
         key = interpolant_key(kind, box)
         keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
         values = {"kind": kind, "box": box, "problems": keys}
-        yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
+        yield Task(values, seconds=10.0, name=key, key=key)
     for one in (*study.shapes.referred, *study.shapes.finite) if study.shapes else ():
         task = shape_reference_task(study, *one)
         yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
