@@ -19,7 +19,7 @@ from springtune.springs.lattice import COEFFICIENT
 from . import checks
 from .combinations import add_rows, combinations, read_printed
 from .fields import FILES, RANGE_DIGITS
-from .kind import Kind
+from .kind import StudyKind
 from .messages import Problems, StudyError, read_study, validated
 from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study
 from .sections import StudyConfig, study_model
@@ -29,7 +29,7 @@ Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 FROM_THE_STUDY = "give its path relative to the study's folder"
 
 
-def load(path: str | Path, kinds: tuple[Kind, ...]) -> Study:
+def load(path: str | Path, kinds: tuple[StudyKind, ...]) -> Study:
     """Read, validate and expand a study."""
     path, file = Path(path), str(path)
     text, content, lines = read_study(path)
@@ -216,7 +216,7 @@ def build(
     config: StudyConfig,
     bodies: Declared,
     grids: tuple[Grid, ...],
-    kinds: Sequence[Kind],
+    kinds: Sequence[StudyKind],
     problems: Problems,
     about: dict[str, Any],
 ) -> Study:

@@ -13,7 +13,7 @@ from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, Anisotropic
 
 from . import fields
 from .fields import Named, OneOrMore, Section, default, one_of
-from .kind import Kind, kinds
+from .kind import StudyKind, kinds
 from .messages import refuse, words
 
 
@@ -397,7 +397,7 @@ GRIDS_NEED = ("beams", "materials")
 
 
 @cache
-def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
+def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
     made = [output for kind in kinds for output in kind.outputs]
     own: dict[str, Any] = {name: field for kind in kinds for name, field in kind.grid_fields.items()}

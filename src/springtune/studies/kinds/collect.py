@@ -19,7 +19,7 @@ from ..runs.store import DamagedError
 from . import load_study
 
 if TYPE_CHECKING:
-    from ..config.kind import Kind
+    from ..config.kind import StudyKind
     from ..config.model import Study
 
 
@@ -46,12 +46,12 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     atomic.write_json(record, {"digest": digest})
 
 
-def group_of(kind: "Kind") -> dataset.Group:
+def group_of(kind: "StudyKind") -> dataset.Group:
     """Group that a kind without a module ``collect`` declares."""
     return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions, kind.flags)
 
 
-def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+def _of_tasks(kind: "StudyKind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     """Group of such a kind, of the stored rows of its stages."""
     group, found = group_of(kind), [row for stage in kind.stages for row in rows(stage, study, folder)]
     names = {name for row in found for name in row} if kind.sparse else None

@@ -15,7 +15,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind, Stage
+from ...config.kind import Stage, StudyKind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
@@ -169,7 +169,7 @@ VARIABLES = {
     ),
 }
 
-KIND = Kind(
+KIND = StudyKind(
     "benchmark",
     study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error: group `/benchmark`.")},
     check=_check,

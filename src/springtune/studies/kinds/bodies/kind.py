@@ -14,7 +14,7 @@ from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem
 from springtune.safe_io.tables import aligned
 
-from ...config.kind import Kind
+from ...config.kind import StudyKind
 from ...config.model import SceneSpec, Study
 from .outputs import OUTPUTS, mesh_name, stems
 from .plan import STAGES, interpolants, reference_of
@@ -84,7 +84,7 @@ def _files(found):
     return [Path(file) for shape in used for file in shapes.files[shape].values()]
 
 
-KIND = Kind(
+KIND = StudyKind(
     "bodies",
     study_fields={"shapes": SHAPES_KEY, "shape_grids": SHAPE_GRIDS_KEY},
     alone={"shape_grids": ("shapes", "materials")},

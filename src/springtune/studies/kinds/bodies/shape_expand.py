@@ -99,7 +99,7 @@ def files_of(shape, folder):
 
 
 def expand(config, declared):
-    """Shapes of a study that has any, see `springtune.studies.config.kind.Kind`."""
+    """Shapes of a study that has any, see `springtune.studies.config.kind.StudyKind`."""
     found, referred, finite = set(), set(), set()
     for grid in config.shape_grids.values():
         for name in grid.shape:
@@ -150,7 +150,7 @@ READ_AT_ONCE = 1_000_000
 
 
 def check(config, problems):
-    """Add what is wrong, see `springtune.studies.config.kind.Kind`."""
+    """Add what is wrong, see `springtune.studies.config.kind.StudyKind`."""
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
         for part, material in shape.parts.items():

@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind, Stage
+from ...config.kind import Stage, StudyKind
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import SETTING
@@ -193,7 +193,7 @@ def _tasks(study):
 
 STAGE = Stage("engines", "studies.kinds.engines.solve", _tasks, alone=True)
 
-KIND = Kind(
+KIND = StudyKind(
     "engines",
     study_fields={"engines": optional(EnginesConfig, "Scenes in engines: groups `/engines` and `/engine_curves`.")},
     check=_check,

@@ -13,7 +13,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind, Stage
+from ...config.kind import Stage, StudyKind
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from .outputs import OUTPUTS
@@ -159,7 +159,7 @@ LAYING_VARIABLES = {
 }  # fmt: skip
 
 
-KIND = Kind(
+KIND = StudyKind(
     "laying",
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid: group `/laying`.")},
     check=_check,

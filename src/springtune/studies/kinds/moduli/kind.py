@@ -11,7 +11,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.kind import Kind, Stage
+from ...config.kind import Stage, StudyKind
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
@@ -93,7 +93,7 @@ def _attributes(moduli):
     return {"comment": comment, "patch_length": box.length, "patch_height": box.height}
 
 
-KIND = Kind(
+KIND = StudyKind(
     "moduli",
     study_fields={
         "patch": (

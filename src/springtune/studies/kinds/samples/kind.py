@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
-from ...config.kind import Kind, Stage
+from ...config.kind import Stage, StudyKind
 from ...config.messages import OrSection, refuse, show, words
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.plan import Task
@@ -329,7 +329,7 @@ def _tables(study):
     return ["sobol"] if sample and sample.design == SOBOL_INDICES else []
 
 
-KIND = Kind(
+KIND = StudyKind(
     "samples",
     study_fields={"samples": optional(SamplesConfig, "Sampled scenes: groups `/samples` and `/sobol`.")},
     alone={"samples": ()},

@@ -11,7 +11,7 @@ from springtune.mesh.types import MESH_TYPES
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_density, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind, Stage
+from ...config.kind import Stage, StudyKind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import AXES, EXPERIMENTS, ONCE
@@ -198,7 +198,7 @@ EXPERIMENT_DIMENSIONS: dict[str, str | tuple[str, str]] = {
 }
 
 
-KIND = Kind(
+KIND = StudyKind(
     "stability",
     study_fields={"stability": optional(StabilityConfig, "Experiments on numerical stability: group `/stability`.")},
     check=_check,
