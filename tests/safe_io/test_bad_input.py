@@ -466,15 +466,3 @@ class TestDatasets:
         told = CliRunner().invoke(main, ["info", str(path)])
         assert told.exit_code == 1 and isinstance(told.exception, SystemExit), told.output
         assert len(told.output.splitlines()) == 1 and str(path) in told.output and says in told.output
-
-    def test_a_gigabyte_is_the_most_that_a_small_dataset_says_it_holds(self, path):
-        """A chunk is read as one, so that a single number of it took a gigabyte and more."""
-        sound = path.read_bytes()
-        for made in ({"shape": (140_000_000,), "chunks": (1024,)},
-                     {"shape": (10,), "maxshape": (None,), "chunks": (140_000_000,)}):  # fmt: skip
-            path.write_bytes(sound)
-            with h5py.File(path, "r+") as file:
-                file.create_dataset("many", dtype="f8", compression="gzip", **made)
-            for call in (st.open, page):
-                with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 1\.1\d GB in .* MB\)"):
-                    call(path)

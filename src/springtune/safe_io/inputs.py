@@ -222,11 +222,8 @@ HEAPS_SEARCHED = 2**28
 """Bytes of a file that are searched for heaps, from its start."""
 
 
-def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], None] | None" = None) -> None:
-    """Refuse an HDF5 file whose data are in other files, or whose groups are no tree of limited size.
-
-    `look` is called with the name of each group, array and type, and with itself.
-    """
+def check_alone(path: str | Path) -> None:
+    """Refuse an HDF5 file whose data are in other files, or whose groups are no tree of limited size."""
     import h5py
 
     found: list[tuple[bytes, int]] = []
@@ -264,10 +261,6 @@ def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], No
                         names[shown] = f"stored outside of the file, in {outside!r}"
                     if stored.get_layout() == h5py.h5d.VIRTUAL:
                         names[shown] = "a virtual dataset"
-                if look:
-                    look(name, one)
-            if look:
-                look(b"/", root)
     except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
         raise OSError(f"damaged: {error}") from None
     for place, what in names.items():

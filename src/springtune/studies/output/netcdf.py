@@ -35,8 +35,8 @@ def variables(group: h5py.Group) -> dict[str, Stored]:
         if isinstance(array, h5py.Dataset) and not is_bare(array):
             scales = [h5py.h5r.get_name(one[0], array.id) for one in array.attrs.get("DIMENSION_LIST", ())]
             dims = [scale.decode().rpartition("/")[2] for scale in scales] or [name] * ("CLASS" in array.attrs)
-            if len(dims) != array.ndim:
-                raise ValueError(f"'{name}' has no dimension scale for each of its {array.ndim} dimensions")
+            if array.shape is None or len(dims) != array.ndim:
+                raise ValueError(f"'{name}' has no shape, or has no dimension scale for each dimension")
             found[name] = Stored(tuple(dims), attributes_of(array), array)
     return found
 

@@ -1,6 +1,5 @@
 """Open the dataset of a study safely."""
 
-import math
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io.escapes import clipped
-from springtune.safe_io.inputs import BeyondBound, bounded, check_alone
+from springtune.safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone
 
 if TYPE_CHECKING:
     import h5py
@@ -22,13 +21,7 @@ SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
 
 MOST_HELD = 1e9
-"""Limit of bytes that opening takes, and of stated content."""
-
-DEFLATED = 30.0
-"""Largest ratio of content to file size for files above `MOST_HELD`."""
-
-MOST_CHUNKS = 1_000_000
-"""Most chunks of an array."""
+"""Limit of bytes that opening takes."""
 
 LONGEST_REASON = 200
 
@@ -83,9 +76,10 @@ def opened(path: str | os.PathLike[str]) -> "Iterator[h5py.File]":
     from .netcdf import attributes_of
 
     path = dataset_file(path)
-    check(path)
-    with legible(path), h5py.File(path) as file:
-        attributes = attributes_of(file)
+    with legible(path), bounded(MOST_HELD):
+        check_alone(path)
+        with h5py.File(path) as file:
+            attributes = attributes_of(file)
     if "springtune_version" not in attributes:
         raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
     name = attributes.get("study", "unknown")
@@ -100,6 +94,8 @@ def legible(path: str | os.PathLike[str]) -> Iterator[None]:
     """Context of a refusal of whatever the libraries raise when they trip over a damaged file."""
     try:
         yield
+    except DataElsewhere:
+        raise
     except Exception as error:
         raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
 
@@ -113,64 +109,6 @@ def dataset_file(path: str | os.PathLike[str]) -> Path:
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
     return file
-
-
-def check(path: Path) -> None:
-    """Refuse files that read other files, or that are small and state large content."""
-    import h5py
-
-    from .netcdf import is_bare
-
-    held = 0.0
-
-    def look(name: bytes, one: "h5py.h5g.ObjectID") -> None:
-        nonlocal held
-        if not isinstance(one, h5py.h5d.DatasetID):
-            return
-        array, shown = h5py.Dataset(one), clipped(name.decode(errors="replace"))
-        if array.shape is None:
-            raise ValueError(f"'{shown}' has no shape")
-        if is_bare(array):
-            return
-        chunk, texts = array.chunks or (), h5py.check_string_dtype(array.dtype)
-        held += max(array.size, math.prod(chunk)) * int(one.get_type().get_size())
-        if texts and texts.length is None:
-            stored = one.get_create_plist()
-            if stored.get_nfilters() or stored.get_layout() == h5py.h5d.COMPACT:
-                raise ValueError(f"'{shown}' has compressed texts, as netCDF does not have; write them as they are")
-            held += _length_of_texts(array, path)
-        pieces = math.prod(-(-length // part) for length, part in zip(array.shape, chunk))
-        if pieces > MOST_CHUNKS and held <= most_of(path):
-            raise ValueError(f"'{shown}' is in {pieces} pieces, which take too long to read; write larger ones")
-
-    try:
-        with guarded(path), bounded(MOST_HELD):
-            check_alone(path, look)
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
-    if held > most_of(path):
-        said = f"it says that it holds {held / 1e9:.3g} GB in {path.stat().st_size / 1e6:.3g} MB"
-        raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
-
-
-def _length_of_texts(array: "h5py.Dataset", path: Path) -> int:
-    """Length of all texts of an array by their references, 4 bytes of length and 12 of place: many may be one text."""
-    import numpy as np
-
-    if array.chunks:
-        places: list[tuple[int, ...]] = []
-        array.id.chunk_iter(lambda info: places.append(info.chunk_offset))
-        content = b"".join(array.id.read_direct_chunk(place)[1] for place in places)
-    else:
-        with path.open("rb") as file:
-            file.seek(array.id.get_offset() or 0)
-            content = file.read(array.id.get_storage_size())
-    return int(np.frombuffer(content, "<u4")[::4].sum(dtype=int))
-
-
-def most_of(path: Path) -> float:
-    """Most bytes that a file may take in memory."""
-    return max(MOST_HELD, DEFLATED * path.stat().st_size)
 
 
 @contextmanager
@@ -269,10 +207,6 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
     swept = [name for name in SWEPT if f"{OF_FIELDS}{name}" in fields]
     asked = {name: labels.pop(name) for name in swept if name in labels}
     fields = fields.drop_vars(swept, errors="ignore")
-    if SPRING_NODES not in fields:
-        raise ValueError(
-            f"group '/fields' has no '{SPRING_NODES}': it was made by an older springtune; run the study again"
-        )
     meshes = ("beam", "mesh_type", "mesh_size")
     for name, label in labels.items():
         if name not in fields.dims or name not in fields.coords:
