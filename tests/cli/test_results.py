@@ -15,7 +15,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
-from springtune.studies.output import dataset, scene_files
+from springtune.studies.output import dataset, export
 
 from synthetic import dataset as every
 from tables import SMALL_AXES as AXES
@@ -205,6 +205,6 @@ def test_where_nothing_is_solved_the_table_of_scenes_is_empty(tmp_path):
     tree = every()
     tree["fields"]["displacement_x"].values[...] = np.nan
     (tmp_path / "former.vtu").touch()
-    assert scene_files.write(tree, tmp_path) == [Path("scenes.csv")]
+    assert export.write_scenes(tree, tmp_path) == [Path("scenes.csv")]
     assert [path.name for path in tmp_path.iterdir()] == ["scenes.csv"]
     assert len((tmp_path / "scenes.csv").read_text().splitlines()) == 1

@@ -215,38 +215,28 @@ def _write_array(group: h5py.Group, name: str, array: xr.Variable) -> h5py.Datas
     sparse = texts and values.nbytes > CHUNK and np.mean(values == "") > MOSTLY_EMPTY
     options: dict[str, Any] = {}
     if sparse:
-        options = {"chunks": _block(array.shape)}
+        options = {"chunks": _chunk(array.shape, TEXTS_IN_CHUNK)}
     elif not texts and values.nbytes > UNCOMPRESSED:
-        options = {"chunks": _chunk(array.shape, values.dtype.itemsize), "compression": "gzip", "shuffle": True}
+        options = {"chunks": _chunk(array.shape, CHUNK // values.itemsize), "compression": "gzip", "shuffle": True}
     dtype = h5py.string_dtype() if texts else values.dtype
     stored = group.create_dataset(name, array.shape, dtype, fillvalue=fill, **options)
     netcdf.add_attributes(stored, array.attrs)
     if not sparse:
         stored[...] = values
         return stored
-    chunks = options["chunks"]
-    for start in np.unique(np.argwhere(values != "") // chunks, axis=0).tolist():
-        cells = tuple(slice(number * size, (number + 1) * size) for number, size in zip(start, chunks))
-        stored[cells] = values[cells]
+    for cells in stored.iter_chunks():
+        if (values[cells] != "").any():
+            stored[cells] = values[cells]
     return stored
 
 
-def _block(shape: Sequence[int]) -> tuple[int, ...]:
-    """Chunk shape of texts, about equal in all dimensions."""
-    block = [1] * len(shape)
-    while np.prod(block) < TEXTS_IN_CHUNK and block != list(shape):
-        _, number = min((block[n], -n) for n, length in enumerate(shape) if block[n] < length)
-        block[-number] = min(2 * block[-number], shape[-number])
-    return tuple(block)
-
-
-def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
-    """Chunk shape: whole last dimensions, then as many of the others as fit."""
-    chunk, room = [], CHUNK // itemsize
+def _chunk(shape: Sequence[int], cells: int) -> tuple[int, ...]:
+    """Chunk shape of so many cells: whole last dimensions, then as many of the others as fit."""
+    chunk: list[int] = []
     for length in reversed(shape):
-        chunk.append(max(1, min(length, room)))
-        room //= chunk[-1]
-    return tuple(reversed(chunk))
+        chunk.insert(0, max(1, min(length, cells)))
+        cells //= chunk[0]
+    return tuple(chunk)
 
 
 LARGE_ARRAY = 2**20

@@ -1,7 +1,9 @@
-"""Export a group of a dataset as one long table."""
+"""Files for other programs: a group of a dataset as one long table, and a VTU file of each scene with fields."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -9,12 +11,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from springtune.handover.paraview import write_vtu
 from springtune.problem.quantities import nearest
 from springtune.problem.status import Status
-from springtune.safe_io.atomic import check_folder, replacing
+from springtune.safe_io.atomic import check_folder, replacing, write_text
 
 from ...registry import how_to_install
+from . import reading
 from .dataset import flag_words, is_flagged
+from .text import cell_text
 
 TABLE_ENDINGS = (".csv", ".parquet")
 
@@ -85,3 +90,47 @@ def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False)
         else:
             frame.to_parquet(unfinished, index=False)
     return f"{path}: {len(frame)} rows, {len(frame.columns)} columns of group '{group}'"
+
+
+# -- scenes in VTU files for ParaView ----------------------------------------------------------------------------------
+
+MESH_DIMENSIONS = ("beam", "mesh_type", "mesh_size")
+
+SCENES_LIST = "scenes.csv"
+"""Table of the files, with the labels of each."""
+
+
+def write_scenes(tree: xr.DataTree, folder: Path) -> list[Path]:
+    """Write a file for each scene that has fields, and their table."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.vtu"):
+        old.unlink()
+    fields, rows = tree["fields"].to_dataset(), []
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
+    solved = solved.transpose(*MESH_DIMENSIONS, *(name for name in solved.dims if name not in MESH_DIMENSIONS))
+    units = {name: str(fields[name].attrs.get("units", "1")) for name in solved.dims}
+    for place in np.argwhere(solved.values):
+        labels = {str(name): solved[name][at].item() for name, at in zip(solved.dims, place)}
+        name = cell_text(labels, units).replace(", ", "_").replace(" ", "") + ".vtu"
+        _write_scene(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", "")} | labels)
+        rows.append({"file": name} | labels)
+    write_text(folder / SCENES_LIST, pd.DataFrame(rows, columns=["file", *units]).to_csv(index=False))
+    return [Path(SCENES_LIST)]
+
+
+def _write_scene(path: Path, network: xr.Dataset, labels: Mapping[str, object]) -> None:
+    """Write a network: particles with displacements, springs as lines, cells; all in SI units."""
+
+    def vectors(names: str) -> np.ndarray:
+        return np.stack([network[names.format(axis)].values for axis in "xy"], axis=1)
+
+    network = network.squeeze([name for name in labels if name in network.dims])  # a mesh may be of one cell
+    corners = network[reading.CELL_NODES].transpose("cell", ...).values
+    cells = {2: network[reading.SPRING_NODES].transpose("spring", ...).values}
+    cells |= {count: corners[(corners >= 0).sum(axis=1) == count][:, :count] for count in (3, 4)}
+    points = {"displacement": vectors("displacement_{}")}
+    expected = vectors("particle_reference_{}") if "particle_reference_x" in network else np.array(np.nan)
+    if np.isfinite(expected).all():
+        points |= {"reference_displacement": expected, "error": points["displacement"] - expected}
+    springs = {"stiffness": {2: network.stiffness.values}, "force": {2: network.spring_force.values}}
+    write_vtu(path, vectors("{}"), cells, points, springs, {}, json.dumps(labels, indent=1))

@@ -149,7 +149,7 @@ OUTPUTS = (
         "paraview",
         "files for ParaView, with the force of each spring, and the group `/fields`",
         tables=lambda study: ["scenes.csv"],
-        write="studies.output.scene_files:write",
+        write="studies.output.export:write_scenes",
         into="paraview",
         job="scenes",
     ),
