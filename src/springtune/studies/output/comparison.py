@@ -16,9 +16,6 @@ from springtune.problem.quantities import nearest
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
 from .text import NUMBER, from_json, without_numbers
 
-SAME_NUMBER = 1e-9
-"""Relative difference below which two numbers are one label."""
-
 RELATIVE = 1e-6
 """Default relative tolerance."""
 
@@ -136,7 +133,7 @@ def compare(
 ) -> Comparison:
     """Compare two datasets by label; of each variable so many changes are listed.
 
-    Numeric labels match within `SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
+    Numeric labels match in nine digits; NaN equals NaN. Values of cells that one study does not request
     are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out.
 
     Examples
@@ -149,8 +146,7 @@ def compare(
     >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(one, other).changes]
     [('stiffness', '100x20', 2.0)]
     """
-    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in (before, after)]
-    nodes[1] |= {path: _spelt(data, nodes[0][path]) for path, data in nodes[1].items() if path in nodes[0]}
+    nodes = [{node.path: _rounded(node.to_dataset()) for node in tree.subtree} for tree in (before, after)]
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
@@ -174,18 +170,13 @@ def compare(
     return Comparison(found, _only(chosen), {name: (old, new) for name, (old, new) in told.items() if old != new})
 
 
-def _spelt(data: xr.Dataset, like: xr.Dataset) -> xr.Dataset:
-    """A dataset with its numeric labels as in another one, where they are the same but for rounding."""
-    for name in data.indexes.keys() & like.indexes.keys():
-        labels, known = data.indexes[name], like.indexes[name].sort_values()
-        for index in (labels, known):
-            if not index.is_unique:
-                twice = index[index.duplicated()][0]
-                raise ValueError(f"dimension '{name}' has the label {twice} twice; run the study again")
-        if labels.dtype.kind in "iuf" and known.dtype.kind in "iuf" and len(known):
-            places = known.get_indexer(labels, "nearest", tolerance=SAME_NUMBER * np.abs(labels))
-            spelt = np.where(places < 0, labels, known.to_numpy()[places])
-            data = data.assign_coords({name: (name, spelt, data[name].attrs)})
+def _rounded(data: xr.Dataset) -> xr.Dataset:
+    """A dataset whose numeric labels have nine digits, so that those of two machines are the same."""
+    for name, index in data.indexes.items():
+        if not index.is_unique:
+            raise ValueError(f"dimension '{name}' has the label {index[index.duplicated()][0]} twice; run it again")
+        if index.dtype.kind == "f":
+            data = data.assign_coords({name: (name, [float(f"{label:.9g}") for label in index], data[name].attrs)})
     return data
 
 
