@@ -266,6 +266,8 @@ def tree(file: h5py.File) -> xr.DataTree:
         for name, stored in netcdf.variables(group).items():
             large = stored.array.nbytes > LARGE_ARRAY
             values = indexing.LazilyIndexedArray(_OnDemand(stored)) if large else stored.read()
+            if isinstance(values, np.ndarray) and values.dtype == object:
+                values = values.astype(str)
             arrays[name] = xr.Variable(stored.dims, values, stored.attributes)
         data = xr.decode_cf(xr.Dataset(arrays, attrs=netcdf.attributes_of(group)))
         for one in data.variables.values():

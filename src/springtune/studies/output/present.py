@@ -74,10 +74,10 @@ if __name__ == "__main__":
     import gc
     import os
 
-    from fontTools import subset
+    import fontTools.subset
 
     os.environ["MPLBACKEND"] = "Agg"
     gc.set_threshold(100_000, 20, 100)  # looking for garbage among figures takes a tenth of the drawing
     # A PDF has the place of each letter; reading how a font would place them takes a third of its time.
-    subset.Options._drop_tables_default += ["GDEF", "GPOS", "GSUB"]
+    fontTools.subset.Options._drop_tables_default += ["GDEF", "GPOS", "GSUB"]
     main(*sys.argv[1:])
