@@ -50,6 +50,19 @@ def test_root_has_the_names_of_the_contract(tree):
     assert list(root.status.attrs["flag_values"]) == [0, 1, 2, 3, 4, 5]
 
 
+def test_the_stiffness_to_type_is_stated_for_each_definition(tree):
+    root = tree.to_dataset()
+    found = {name: root[f"stiffness_{name}"] for name in ("inside", "outline", "least", "most")}
+    assert all(one.dims == SCENE and one.attrs["units"] == "N/m" for one in found.values())
+    lattice = {name: one.sel(definition="lattice", mesh_type="structured").max().item() for name, one in found.items()}
+    inside = 0.5 * 3**0.5 * 210e9 * 1e-3  # E t
+    assert lattice == pytest.approx({"inside": inside, "outline": 0.5 * inside, "least": 0.5 * inside, "most": inside})
+    uniform = root.stiffness.notnull()
+    assert all((one == root.stiffness).values[uniform.values].all() for one in found.values())
+    solved = root.status == root.status.attrs["flag_values"][1]
+    assert (found["inside"].notnull() | ~solved).all() and (found["least"] <= found["inside"]).values[solved].all()
+
+
 def test_block_and_laying_have_the_names_of_the_contract(tree):
     block, laid = tree["block"].to_dataset(), tree["laying"].to_dataset()
     place = {"beam": "100x20", "material": "rubber", "mesh_type": "structured", "mesh_size": 5e-3}
