@@ -107,8 +107,11 @@ def parse(text: str, kind: str) -> float:
         raise UnitError(f"'{text}' has no unit; {remedy}")
     spelling = _spelling(unit)
     known = _KNOWN.get(spelling) or _ask_pint(spelling)
+    if known is None and unit[0] == ",":
+        raise UnitError(f"'{text}' has a comma: write a decimal point; {remedy}")
     if known is None:
-        near = get_close_matches(unit, wanted.units, n=1, cutoff=0.5)
+        same = [one for one in wanted.units if one.casefold() == unit.casefold()]
+        near = same or get_close_matches(unit, wanted.units, n=1, cutoff=0.5)
         meant = f", did you mean '{near[0]}'?" if near else ";"
         raise UnitError(f"'{text}': unknown unit '{unit}'{meant} {remedy}")
     is_kind, size = known

@@ -28,12 +28,7 @@ SHOWN_PROBLEMS = 5
 
 
 class StudyError(ValueError):
-    r"""A study that cannot be run; the message names file, line, key, value and remedy.
-
-    Parameters
-    ----------
-    *lines : str
-        Lines of the message; control characters in them are shown as ``\x1b``.
+    """A study that cannot be run; the message names file, line, key, value and remedy.
 
     Examples
     --------
@@ -53,17 +48,7 @@ class StudyError(ValueError):
 
 
 class Problems:
-    """Collect problems of a file and raise them as one `StudyError`.
-
-    Examples
-    --------
-    >>> problems = Problems("study.yaml", {("beams",): 3})
-    >>> problems.add(("beams", "small"), "no length; give one such as '200 mm'")
-    >>> problems.stop()
-    Traceback (most recent call last):
-    ...
-    springtune.studies.config.messages.StudyError: study.yaml:3: beams.small: no length; give one such as '200 mm'
-    """
+    """Collect problems of a file and raise them as one `StudyError`."""
 
     def __init__(self, file: str, lines: Lines | None = None, content: Any = None, folder: Path = Path()) -> None:
         self._file, self._lines, self.content, self.folder = file, lines or {}, content, folder
@@ -292,9 +277,7 @@ def read_study(path: str | Path) -> tuple[str, Any, Lines]:
 
 
 def read_yaml(text: str, file: str) -> tuple[Any, Lines]:
-    r"""Content of a YAML text as dicts, lists and texts, and the line of each path of keys.
-
-    Scalars stay texts: names such as ``1e3`` or ``no`` are not numbers or booleans.
+    r"""Content of a YAML text, whose scalars stay texts, and the line of each path of keys.
 
     Examples
     --------

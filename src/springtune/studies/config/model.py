@@ -130,21 +130,10 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A study, ready to run; one is equal to itself alone.
+    """A study, ready to run.
 
-    All tuples are free of duplicates and ordered by beam and material as declared, then by mesh type, mesh size, load,
-    definition and kinematics, whatever the order of grids and of the lists in them.
-
-    `mesh_files` has the `MeshSpec` of meshes from files by mesh type, beam's name and mesh size. `parts` has what study
-    kinds made of it, by their names.
-
-    `stiffness_ratios` are k / (E t) along every curve, ascending [1]; `stiffness_table` has the stiffness [N/m] of the
-    definition ``paper`` by mesh type and material; the curves of a beam and load, `calibration`, calibrate
-    ``calibrated``.
-
-    `axes` has the labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m]. `swept` are parameters
-    of `springtune.problem.parameters.SWEPT` that are dimensions. `printed` cells are of
-    `springtune.studies.config.combinations.PrintedCell`, `files` all that it names.
+    Tuples have no duplicates and are ordered by beam and material as declared, then by mesh type, mesh size, load,
+    definition and kinematics.
     """
 
     name: str
@@ -155,20 +144,20 @@ class Study:
     scenes: tuple[SceneSpec, ...]
     curves: tuple[CurveSpec, ...]
     references: tuple[Reference, ...]
-    mesh_files: MeshFiles
+    mesh_files: MeshFiles  # by mesh type, beam's name and mesh size
     outputs: tuple[str, ...]
     further_references: tuple[str, ...]
     materials: dict[str, AnyMaterial]
-    parts: dict[str, Any]
+    parts: dict[str, Any]  # by study kind
     grids: tuple[Grid, ...]
-    stiffness_ratios: tuple[float, ...]
-    stiffness_table: dict[tuple[str, str], float]
-    calibration: tuple[str, str] | None
-    printed: tuple[Any, ...]
+    stiffness_ratios: tuple[float, ...]  # k / (E t) along every curve, ascending [1]
+    stiffness_table: dict[tuple[str, str], float]  # of `paper`, by mesh type and material [N/m]
+    calibration: tuple[str, str] | None  # beam and load of the curves that calibrate `calibrated`
+    printed: tuple[Any, ...]  # of `PrintedCell`
     printed_path: Path | None
-    axes: dict[str, tuple[str | float, ...]]
-    swept: tuple[str, ...] = ()
-    files: tuple[Path, ...] = ()
+    axes: dict[str, tuple[str | float, ...]]  # labels of each dimension of the dataset
+    swept: tuple[str, ...] = ()  # parameters of `SWEPT` that are dimensions
+    files: tuple[Path, ...] = ()  # that it names
 
     @property
     def plane_strain(self) -> tuple[str, ...]:

@@ -1,20 +1,17 @@
-"""The tasks of a job whose results are missing, done in a worker process.
+"""Solve the tasks of a job whose results are missing, in a worker process.
 
-The content of a job has the ``results`` of the study, the ``folder`` of the stage and its ``files``. A file has a
-``name``, ``tasks``, and values that its tasks share; each task has the ``key`` of its result. The module of a stage
-defines:
+The module of a stage defines ``solve(task)``, which returns a result, and may define:
 
-- ``solve(task)`` returns its result, with ``prepare`` ``solve(task, made)``.
-- ``prepare(file, content)`` returns what the tasks of a file share, such as a mesh, or raises `RefusedError`.
+- ``prepare(file, content)`` returns what the tasks of a file share, for ``solve(task, made)``, or raises
+  `RefusedError`.
 - ``failed(task, why)`` returns the result of a failed task; by default a status and a message.
-- ``parts(task, result)`` returns the parts of a result by key, if it is stored in several parts.
+- ``parts(task, result)`` returns the parts of a result by key.
 - ``tasks(file, content)`` returns the tasks of a file, if their keys depend on other results.
 - ``order(task)`` is the sort key of tasks.
+- ``run(content, attempts)`` replaces the loop over files and tasks.
 
-All but ``solve`` are optional. A module with a loop of its own has ``run(content, attempts)``.
-
-A task that fails is a result with its reason; so is one whose process dies, and the worker is started anew for the
-others. A broken program ends the job when all other tasks are done.
+A failed task is a result with its reason, also if its process dies. A broken program ends the job after all other
+tasks.
 """
 
 import ctypes
@@ -51,7 +48,7 @@ Result = dict[str, Any]
 
 
 class RefusedError(Exception):
-    """Tasks cannot be prepared, mostly for want of their mesh."""
+    """Tasks cannot be prepared, mostly because their mesh failed."""
 
 
 def in_worker(name: str, content: dict[str, Any]) -> int:
@@ -76,10 +73,7 @@ def end_with_parent() -> None:
 
 
 def do(name: str, content: dict[str, Any], lost: Mapping[str, str] | None = None, under_way: int | None = None) -> int:
-    """Do the tasks of a job whose results are missing; return their number.
-
-    ``lost`` has the reasons of tasks that are not to be tried again.
-    """
+    """Do the tasks of a job whose results are missing, except `lost` ones with their reasons; return their number."""
     module, attempts = imported(name), Attempts(lost or {}, under_way)
     getattr(module, "run", partial(solve_files, module))(content, attempts)
     for error in attempts.broken[:TRACEBACKS]:

@@ -1,14 +1,8 @@
 """Keys of results: hashes of all inputs, of the code that a result depends on, and of its packages.
 
-Python's minor version counts: sums of floats change with 3.12, and compiled packages differ.
-
-Snakemake does not see edits of imported packages, and the whole package as input would rerun everything. So a module's
-closure is all modules that it imports, directly or not, by grimp: also inside functions and ``try``, but not for type
-checkers. Import from modules, not from packages: an ``__init__`` brings in all that it imports.
-
-Imports by a name in a text are not seen. Definitions and mesh types are added where they are chosen
-(`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`. A template or a table counts with the
-module that has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
+The code of a module is its closure: all modules that it imports, directly or not, by grimp, also inside functions, but
+not for type checkers. Import from modules, not from packages: an ``__init__`` brings in all that it imports. Imports
+by name are not seen. Python's minor version counts, since sums of floats change with it.
 """
 
 import ast
@@ -38,7 +32,7 @@ CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydanti
 """Packages whose versions do not influence results: they carry numbers as they are."""
 
 DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
-"""Distributions with another name than their package; looking one up takes a third of a second."""
+"""Distributions with another name than their package; a search takes a third of a second."""
 
 
 def for_readers(one: Any) -> bool:
@@ -164,7 +158,7 @@ def declared_closure(one: Declared) -> Closure:
 
 
 def elsewhere(path: Path) -> Closure:
-    """Closure of code elsewhere, which follows the files of modules that no distribution has."""
+    """Closure of code outside of this package, with the files of modules that no distribution has."""
     files, waiting = {path}, [path]
     ours, packages = set[str](), plugin_packages() & {*path.with_suffix("").parts}  # a package's version counts, too
     for place in waiting:
@@ -182,7 +176,7 @@ def elsewhere(path: Path) -> Closure:
 
 
 def _imports(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Level and name of what code imports, names and all; and what it takes of this package by its attributes."""
+    """Yield level and full name of each import, and of each attribute of this package that code uses."""
     nodes = [*ast.walk(tree)]
     aliases = [alias for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     yield from ((0, alias.name) for alias in aliases)
@@ -196,7 +190,7 @@ def _imports(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 
 def _modules_of(parts: list[str]) -> set[str]:
-    """Module of this package with a name below it: the last one on its way, or that of a public name."""
+    """Module of this package that defines a dotted name."""
     places: dict[str, str] = vars(sys.modules[PACKAGE.name])["_PLACES"]
     if len(parts) == 1 and parts[0] in places:
         return {places[parts[0]]}

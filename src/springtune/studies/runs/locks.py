@@ -1,8 +1,7 @@
-"""Who runs what in a folder, and whose results it holds.
+"""Locks of running studies, and the study that a folder of results belongs to.
 
-Snakemake's locks do not say which process holds them, and stay after a kill. So a run holds a lock of the system on a
-note in each study's folder, which the system opens when the process ends, however it ends. `springtune run` then
-removes Snakemake's.
+Snakemake's locks stay after a kill. A run also locks a note in each study's folder by `flock`, which ends with the
+process; so `springtune run` knows when it can remove Snakemake's lock.
 """
 
 import fcntl
@@ -40,7 +39,7 @@ def claim(folder: Path, config: Path) -> None:
 
 
 def claimed(folder: Path) -> Path | None:
-    """File of the study that a folder belongs to; None where it is not known or not there."""
+    """File of the study that a folder belongs to, or None."""
     try:
         path = folder.parent.parent / json.loads((folder / STUDY_FILE).read_bytes())["config"]
     except (OSError, ValueError, LookupError, TypeError):
@@ -49,11 +48,7 @@ def claimed(folder: Path) -> Path | None:
 
 
 def check_claim(folder: Path, config: Path) -> None:
-    """Refuse a folder that belongs to another study of the same name.
-
-    A file that was moved, a link to it and a file with the same content are the same study. A folder without a note is
-    of any study of its name.
-    """
+    """Refuse a folder of another study of the same name; a file with the same content is the same study."""
     other = claimed(folder)
     if other is None or not config.is_file() or filecmp.cmp(other, config, shallow=False):
         return
@@ -75,7 +70,7 @@ def begin(folders: Iterable[Path]) -> None:
 
 
 def end() -> None:
-    """Note that this process is at its end."""
+    """Unlock the notes of this process."""
     while HELD:
         with HELD.pop() as file:
             file.truncate(0)

@@ -1,8 +1,6 @@
-"""From a study to the jobs of its stages: tasks bundled into jobs of about equal work, and their stored results.
+"""Jobs of a study's stages: tasks bundled into jobs of about equal work, and their stored results.
 
-One process a scene would be all start-up. The largest tasks are shared out first, by expected seconds that follow from
-numbers of particles alone, so that a study has the same jobs each time and on each machine. A plan is made whenever the
-Snakefile is read, and written when a run begins: reading changes nothing.
+Expected seconds follow from numbers of particles alone, so that a study has the same jobs on each machine.
 """
 
 import json
@@ -29,36 +27,16 @@ MOST_JOBS = 64
 
 @dataclass(frozen=True)
 class Task:
-    """A task of a stage.
+    """A task of a stage; tasks of one name are in one bundle."""
 
-    Attributes
-    ----------
-    values : dict
-        Argument of ``solve``, without labels, so that a new label computes nothing again.
-    also : sequence
-        Further parts of its key: code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`.
-    labels : dict
-        Labels of its cell of the dataset; a label may be several.
-    seconds : float
-        Expected seconds, for bundles of about equal work.
-    name : str
-        Tasks of one name are in one bundle; by default a hash of its values.
-    file : str
-        Stem of the file of its result; by default its key.
-    shared : dict
-        Values that all tasks of that file share.
-    key : str
-        Key of its result; by default a hash of all inputs.
-    """
-
-    values: Mapping[str, Any]
-    also: Sequence[object] = ()
-    labels: Mapping[str, Any] = field(default_factory=dict)
-    seconds: float = 0.0
-    name: str = ""
-    file: str = ""
-    shared: Mapping[str, Any] = field(default_factory=dict)
-    key: str = ""
+    values: Mapping[str, Any]  # argument of `solve`, without labels, so that a new label computes nothing again
+    also: Sequence[object] = ()  # code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`
+    labels: Mapping[str, Any] = field(default_factory=dict)  # of its cell of the dataset; a label may be several
+    seconds: float = 0.0  # expected, for bundles of about equal work
+    name: str = ""  # by default a hash of its values
+    file: str = ""  # stem of the file of its result; by default its key
+    shared: Mapping[str, Any] = field(default_factory=dict)  # values that all tasks of that file share
+    key: str = ""  # by default a hash of all inputs
 
     def key_of(self, stage: Stage) -> str:
         """Key of its result."""
@@ -67,21 +45,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Job:
-    """A job of a run.
-
-    `digest` is a hash of all that it depends on, without products of other jobs, which it ``reads``. Jobs of stages
-    have a label, which they share with the job of the stage before that made their meshes, and their tasks as
-    ``content``.
-    """
+    """A job of a run; `digest` is a hash of all that it depends on, without products of other jobs."""
 
     folder: Path
     name: str
     digest: str
     products: tuple[str, ...]
-    reads: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()  # products of other jobs
     stage: Stage | None = None
-    label: str = ""
-    content: Mapping[str, Any] = field(default_factory=dict)
+    label: str = ""  # of its bundle
+    content: Mapping[str, Any] = field(default_factory=dict)  # its tasks
 
     @property
     def record(self) -> Path:

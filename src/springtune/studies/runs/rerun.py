@@ -1,8 +1,4 @@
-"""All jobs of a study, and those that a run has to do: never done, with another request, or with missing products.
-
-Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are defined here: the dataset, the figures
-and tables, the page to browse and the paper.
-"""
+"""All jobs of a study: its stages, dataset, figures, tables, pages and the paper; and why a job runs again."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -126,15 +122,12 @@ def fault(job: Job) -> str:
 
 
 def is_missing(why: str) -> bool:
-    """Return whether a reason is a missing file, which a user should know."""
+    """Return whether a reason is a missing file."""
     return why.endswith(MISSING)
 
 
 def outdated(study: "Study", folder: Path) -> dict[Path, str] | None:
-    """Return the records of done jobs that must run again, with the reasons; None if a job was never done.
-
-    Snakemake does not find all of these: it compares parameters with its own notes, and knows no stored results.
-    """
+    """Return the records of done jobs that must run again, with the reasons; None if a job was never done."""
     if not (folder / TASKS).exists():  # never run: planning 10,000 scenes takes a second
         return None
     faults = {job.record: why for job in jobs(study, folder).values() if (why := fault(job))}

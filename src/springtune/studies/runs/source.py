@@ -1,7 +1,4 @@
-"""Where the workflow and files of studies are, and hashes and notes by which runs know what changed.
-
-The workflow is in the source tree around the package, else in the package itself, as a wheel has it.
-"""
+"""Paths of the workflow, in the source tree or in a wheel's package; hashes and notes."""
 
 import hashlib
 import json
@@ -33,13 +30,13 @@ def workflow_folder(package: Path = PACKAGE) -> Path:
 
 
 def clone(package: Path = PACKAGE) -> Path | None:
-    """Clone that the library is used from; None of a built package, whatever git knows of the folders above it."""
+    """Clone that the library is used from; None for a built package."""
     root = workflow_folder(package)
     return root if (root / ".git").exists() else None
 
 
 def config_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
-    """A study or another file: beside a study, in config/ of the current folder, or in that of the workflow."""
+    """Path of a file beside a study, in config/ of the current folder, or in that of the workflow."""
     here = (folder / name for folder in (beside, CONFIG_FOLDER))
     return next(filter(Path.is_file, here), workflow_folder() / CONFIG_FOLDER / name)
 
@@ -49,7 +46,7 @@ STATE = "SPRINGTUNE_SOURCE_STATE"
 
 
 def source_state() -> str:
-    """Hash of sizes and times of the package's files; keys of results are those of the code at the begin of a run."""
+    """Hash of sizes and times of the package's files."""
     states = [(str(path), path.stat()) for path in sorted(PACKAGE.rglob("*.py"))]
     return hash_of([[name, state.st_size, state.st_mtime_ns] for name, state in states])
 

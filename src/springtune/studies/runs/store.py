@@ -1,9 +1,8 @@
 """Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
-Scalars and texts are one JSON text, since groups with attributes cost more than solving; arrays are datasets. Former
-results stay, so that going back to them is free. HDF5 has checksums of all that it reads: of its own structures in the
-file format ``latest``, and of data by the filter Fletcher-32. A file has its name in it: one that was exchanged with
-another is not read.
+Scalars and texts are one JSON text, since HDF5 attributes cost more than solving; arrays are datasets. Former results
+stay. Structures have checksums by the file format ``latest``, data by the filter Fletcher-32, and a file has its name
+in it, so that damaged and exchanged files are found.
 """
 
 import io

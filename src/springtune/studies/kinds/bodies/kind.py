@@ -110,13 +110,13 @@ def summary(study: Study, further: list[list[object]]) -> str:
     each = (len(study.scenes) + len(study.curves)) / meshes
     requested = sum(len(grid.scenes) for grid in study.grids)
     repeated = requested - len(study.scenes)
-    again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
+    again = f"{repeated} of {requested} are in more than one grid" if repeated else ""
     scaled = "small strain scales with force, E t and size"
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", meshes, f"each serves {each:.3g} scenes and curves on average"],
         ["references", len(study.references), f"from {_solutions(study)}: {scaled}"],
-        ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
+        ["curves", len(study.curves), f"{len(study.stiffness_ratios)} stiffnesses each, along one solution path"],
         *further,
         *([["printed", len(study.printed), "cells to compare with"]] if study.printed else []),
     ]
