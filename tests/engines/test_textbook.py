@@ -292,7 +292,7 @@ def test_energies_besides_springs(engine, case):
     [
         ("xpbd", 35.0, 30),
         ("projective", 10.0, 60),
-        ("vbd", 10.0, 20),
+        pytest.param("vbd", 10.0, 20, marks=pytest.mark.slow),
         ("vbd-inertia", 10.0, 30),
         ("implicit-cg", 100.0, 25),
     ],

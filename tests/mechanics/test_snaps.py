@@ -33,7 +33,9 @@ def check(arch, shares):
                 assert said == pytest.approx(100 / share, rel=0.01), (arch, share)
 
 
-@pytest.mark.parametrize("arch", ARCHES[::9], ids=lambda arch: f"{arch.form}-{arch.ends}-{arch.load}-{arch.definition}")
+@pytest.mark.parametrize(
+    "arch", ARCHES[::14], ids=lambda arch: f"{arch.form}-{arch.ends}-{arch.load}-{arch.definition}"
+)
 def test_an_arch_beyond_its_limit_load_is_not_solved(arch):
     check(arch, (0.9, 1.05, 5.0))
 

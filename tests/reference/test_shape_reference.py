@@ -208,7 +208,9 @@ def estimates_hold(shape, monkeypatch):
         assert found.values[name] == pytest.approx(fine.values[name], rel=both)
 
 
-@pytest.mark.parametrize("seed", FOLDED)
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=() if seed == FOLDED[0] else pytest.mark.slow) for seed in FOLDED]
+)
 def test_no_triangle_of_a_sector_folds(seed, monkeypatch):
     shape = others.random_sector(seed)
     assert folded(shape) == 0

@@ -145,8 +145,8 @@ def interior(nu):
     return [8.0, *np.linalg.solve(ratios[:, None] ** [2, 1, 0], values - 8 * ratios**3)]
 
 
-@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
-@pytest.mark.parametrize("aspect_ratio", [40, 300, 3000])
+@pytest.mark.parametrize("nu", [0.0, 0.5])
+@pytest.mark.parametrize("aspect_ratio", [40, 3000])
 def test_slender_cantilevers_follow_the_cubic_of_short_ones(aspect_ratio, nu):
     body = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "slender")
     result = solve_small_strain(body, Material(3e9, nu, name="any"), 7.0, kind=BENDING)
@@ -157,7 +157,7 @@ def test_slender_cantilevers_follow_the_cubic_of_short_ones(aspect_ratio, nu):
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.5])
-@pytest.mark.parametrize("aspect_ratio", [10, 100, 1000, 4000])
+@pytest.mark.parametrize("aspect_ratio", [10, 1000, 4000])
 @pytest.mark.parametrize("degree", [3, 6])
 def test_rounding_of_slender_cantilevers_is_bounded(aspect_ratio, nu, degree):
     """With nu = 0 level 6 lacks 6e-8 over the aspect ratio cubed of the exact answer; with any, levels only rise."""
@@ -171,8 +171,7 @@ def test_rounding_of_slender_cantilevers_is_bounded(aspect_ratio, nu, degree):
 BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
 
 
-@pytest.mark.parametrize("nu", [-0.5, 0.3])
-@pytest.mark.parametrize("kind", [BENDING, SHEAR, BUILT_IN], ids=str)
+@pytest.mark.parametrize(("kind", "nu"), [(BENDING, -0.5), (SHEAR, 0.3), (BUILT_IN, 0.3)], ids=str)
 def test_slender_bodies_that_bend_are_refused_by_their_ratio_alone(kind, nu):
     """The most slender ones are solved; below 7000 : 1 the bound on rounding is the same on every processor."""
     for ratio in (6300, 7000):
@@ -181,9 +180,7 @@ def test_slender_bodies_that_bend_are_refused_by_their_ratio_alone(kind, nu):
         solve_unit(1 / 7001 if kind == SHEAR else 7001, nu, kind)
 
 
-@pytest.mark.parametrize(
-    ("degree", "ratio", "nu"), [(5, 7000, -0.9), (5, 7000, 0.5), (6, 7000, 0.0), (6, 7000, -0.9), (7, 4666, 0.0)]
-)
+@pytest.mark.parametrize(("degree", "ratio", "nu"), [(5, 7000, 0.5), (6, 7000, -0.9)])
 def test_rounding_of_the_most_slender_cantilever_of_a_level_is_bounded(degree, ratio, nu):
     ratio *= min(1.0, 2 * (1 + nu)) ** 0.5
     level = UnitLevel(2 * ratio, nu, degree, BENDING)

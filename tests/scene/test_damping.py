@@ -164,7 +164,15 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
     assert found.decrement == pytest.approx(decrement, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", ["xpbd", "projective", "vbd", "vbd-inertia", "implicit-cg"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "xpbd",
+        "projective",
+        "implicit-cg",
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("vbd", "vbd-inertia")),
+    ],
+)
 def test_an_implicit_engine_is_given_what_its_steps_lack(name):
     """Iterated to the end it is implicit Euler: it swings with the measured decay about its loaded place."""
     one = scene(size="10 mm", kinematics="nonlinear")

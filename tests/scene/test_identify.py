@@ -196,7 +196,10 @@ UNMEASURED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", UNMEASURED)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(one, marks=() if one in ("zeros", "patch", "gross") else pytest.mark.slow) for one in UNMEASURED],
+)
 def test_points_that_were_not_measured_are_left_out(tmp_path, kind):
     file = beam_field(tmp_path / "f.csv", spoil=UNMEASURED[kind], seed=1)
     found = st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
@@ -204,7 +207,7 @@ def test_points_that_were_not_measured_are_left_out(tmp_path, kind):
     assert len(found.notes) == 1 and " of 300 points are left out, the first at x, y = " in found.notes[0]
 
 
-@pytest.mark.parametrize("cell", ["", "NaN", "-nan(ind)", "1.#QNAN", "masked", "inf", "1.79769e308"])
+@pytest.mark.parametrize("cell", ["", "-nan(ind)", "1.79769e308"])
 def test_points_without_numbers_are_left_out(tmp_path, cell):
     lines = Path(beam_field(tmp_path / "f.csv")).read_text().splitlines()
     for line, column in ((1, 2), (5, 3), (9, 0)):
@@ -224,7 +227,10 @@ NOT_AS_STATED = {
 }
 
 
-@pytest.mark.parametrize("kind", [*list(NOT_AS_STATED)[:-1], pytest.param("angle", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(one, marks=() if one in ("v runs down", "windows") else pytest.mark.slow) for one in NOT_AS_STATED],
+)
 def test_what_does_not_fit_is_noted(tmp_path, kind):
     material, load, spoil, note = NOT_AS_STATED[kind]
     file = beam_field(tmp_path / "f.csv", material, load, spoil)
@@ -234,15 +240,15 @@ def test_what_does_not_fit_is_noted(tmp_path, kind):
 
 @pytest.mark.parametrize(
     ("load", "sign", "why"),
-    [("traction", -1, "runs against the load"), ("shear", 1, "explains"), ("compression", 1, "runs against"),
-     ("pressure", 1, "explains|runs against"), ("bending", 1, "explains|runs against")],
-)  # fmt: skip
+    [("traction", -1, "runs against the load"), ("shear", 1, "explains"), ("bending", 1, "explains|runs against")],
+)
 def test_a_field_of_another_load_is_refused(tmp_path, load, sign, why):
     file = beam_field(tmp_path / "f.csv", SHEET, load, lambda _, moved, __: sign * moved)
     with pytest.raises(TestDataError, match=f"f.csv.*({why})"):
         st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
 
 
+@pytest.mark.slow
 def test_three_curves_tell_three_constants_and_a_usual_ratio_is_assumed(tmp_path):
     tests = []
     for n, angle in enumerate((0.0, np.pi / 2, np.pi / 4)):
