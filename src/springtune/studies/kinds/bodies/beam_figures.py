@@ -204,22 +204,17 @@ def by_beam(root, beam, mesh_type, material, load, kinematics):
 # -- deformed networks -------------------------------------------------------------------------------------------------
 
 DEFINITION = ("lattice", "calibrated", "paper")
-"""Whose network is shown: of those solved on most beams the first of these, else the first."""
+"""Definitions whose network is shown before others that are solved."""
 
 
 def deformed(tree):
     """Figures of deformed networks: one for each mesh type, material and load; see `sensitivity`."""
-    status, fields = group(tree, "/").status, group(tree, "fields")
-    names = fields.definition.values.tolist()
-    solved = status.sel(definition=names).isin((1, 2, 4)).any("mesh_size")
-    if "displacement_x" in fields:
-        solved = fields.displacement_x.isel(particle=0).notnull().any("mesh_size")
+    status = group(tree, "/").status
+    status = status.sel(definition=group(tree, "fields").definition.values)
     for stem, plot, selection in each("deformed", plot_deformed, status, SCENE_LABELS):
-        here = solved.sel({name: label for name, label in selection.items() if name in solved.dims})
-        counts = dict(zip(names, here.sum("beam").transpose("definition").values.tolist()))
-        best = [name for name in names if counts[name] == max(counts.values())]
-        definition = next((name for name in DEFINITION if name in best), best[0])
-        yield stem, plot, selection | {"definition": definition}
+        here = status.sel(selection)
+        names = labels_of(here.isin((1, 2, 4)), "definition") or labels_of(here != 0, "definition")
+        yield stem, plot, selection | {"definition": next((name for name in DEFINITION if name in names), names[0])}
 
 
 @style.styled

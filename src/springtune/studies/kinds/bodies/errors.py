@@ -7,7 +7,7 @@ from springtune.problem.parameters import SWEPT
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import BEYOND_SMALL_STRAIN, in_words
-from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, sign_of_errors
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, sign_of_errors
 from .beam_figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 from .tables import like_with_like
@@ -247,11 +247,10 @@ def _most(present, parameter):
 def _of_beam(root, name, parameter, mesh_size):
     """Errors of a beam over a parameter and definitions; the attribute `words` is the panel's title."""
     here = root.sel(beam=name)
-    present = here.status != 0
+    present = (here.status != 0).any("definition")
+    if mesh_size is not None:
+        choose(present, mesh_size=mesh_size)
     sizes = labels_of(present, "mesh_size")
-    if mesh_size is not None and mesh_size not in sizes:
-        listed = ", ".join(map(str, sizes))
-        raise ValueError(f"mesh_size: nothing of beam {name!r} has {mesh_size!r} m; it has {listed}")
     there = present.any([one for one in present.dims if one not in ("mesh_size", parameter)])
     counts = {size: int(there.sel(mesh_size=size).sum()) for size in sizes}
     if mesh_size is None and max(counts.values()) == 1 and len(sizes) > 1:
@@ -262,9 +261,8 @@ def _of_beam(root, name, parameter, mesh_size):
         size = max(sizes, key=lambda one: (counts[one], -one)) if mesh_size is None else mesh_size
         here, meshes = here.sel(mesh_size=size), f"mesh {1e3 * size:g}\u00a0mm"
     values = last_swept(here.status != 0, parameter)
-    words = [labelled_beam(root, name), meshes]
-    words += swept_words(values)
-    return at(here, values).assign_attrs(words=", ".join(words))
+    words = ", ".join([labelled_beam(root, name), meshes, *swept_words(values)])
+    return at(here, values).assign_attrs(words=words)
 
 
 def _over_values(panel, here, looks, parameter):

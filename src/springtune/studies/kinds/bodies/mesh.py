@@ -31,9 +31,9 @@ def run(content, attempts):
             continue
         attempts.computed += 1
         if isinstance(made, dict):
-            stored.refuse(folder, name, task["key"], made)
+            stored.write(folder, name, task["key"], None, made)
             continue
         grouped = made if isinstance(made, GroupedMesh) else GroupedMesh(made)
         mesh = grouped.mesh
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
-        stored.write_made(folder, name, task["key"], grouped, known)
+        stored.write(folder, name, task["key"], grouped, known)

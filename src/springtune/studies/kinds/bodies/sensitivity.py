@@ -43,23 +43,17 @@ def failed(curve, why):
 def solve(curve, shared):
     """Result of a curve."""
     begin, (sheet, folder) = time.perf_counter(), shared
-    loads = curve["force"] / np.array(curve["stiffnesses"])
-    path = follow(sheet, LOAD_KINDS[curve["kind"]], curve["kinematics"], loads)
-    return _result(path, curve, folder) | {"seconds": time.perf_counter() - begin}
-
-
-def _result(path, curve, folder):
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
-    displacement, stable = path.values, path.stable
+    path = follow(sheet, LOAD_KINDS[curve["kind"]], curve["kinematics"], force / stiffness)
     reference = any_reference.read(folder, curve["reference"])
-    why = objection(reference, force, curve["kinematics"])
-    wanted = force * reference.get("displacement", np.nan)
-    best = meeting(path, force, stiffness, displacement, stable, wanted, why)
+    why, wanted = objection(reference, force, curve["kinematics"]), force * reference.get("displacement", np.nan)
+    best = meeting(path, force, stiffness, path.values, path.stable, wanted, why)
     return {
-        "displacement": displacement,
-        "stable": stable,
-        "message": ending(path, force, stable),
+        "displacement": path.values,
+        "stable": path.stable,
+        "message": ending(path, force, path.stable),
         "best_stiffness": best.stiffness,
         "best_status": best.status,
         "best_message": best.message,
+        "seconds": time.perf_counter() - begin,
     }

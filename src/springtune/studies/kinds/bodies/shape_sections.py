@@ -11,18 +11,14 @@ from ...config import fields
 from ...config.fields import Named, OneOrMore, Section, default, one_of, quantity, read_quantity
 from ...config.messages import refuse, show
 
-KINDS_OF_QUANTITY = {
-    "displacement": "length",
-    "stress": "stress",
-    "reaction": "force",
-    "area": "area",
-    "energy": "energy",
+QUANTITIES = {
+    "displacement": ("length", {"at": "a point", "of": "a group"}),
+    "stress": ("stress", {"at": "a point"}),
+    "reaction": ("force", {"of": "a group that is held"}),
+    "area": ("area", {}),
+    "energy": ("energy", {}),
 }
-"""Kinds of units by kind of quantity."""
-
-PLACES = {"displacement": {"at": "a point", "of": "a group"}, "stress": {"at": "a point"}}
-PLACES |= {"reaction": {"of": "a group that is held"}, "area": {}, "energy": {}}
-"""Keys for the place of a quantity, and what they name, by kind of quantity."""
+"""Dimension of each quantity of interest, and the keys for its place with what they name."""
 
 
 def both(kind: str) -> Any:
@@ -198,20 +194,16 @@ class QuantityConfig(Section):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        given = [name for name in KINDS_OF_QUANTITY if getattr(self, name)]
+        given = [name for name in QUANTITIES if getattr(self, name)]
         if len(given) != 1:
             what = f"{' and '.join(given)} at once" if given else "no quantity"
-            raise refuse(f"{what}; give one of {', '.join(KINDS_OF_QUANTITY)}, such as {{displacement: y, at: tip}}")
-        [kind] = given
-        places = [name for name in ("at", "of") if getattr(self, name) is not None]
-        if len(places) > 1:
-            raise refuse("both a point and a group; give 'at' or 'of'", "of")
-        known = ", or ".join(f"{name}: {what}" for name, what in PLACES[kind].items())
+            raise refuse(f"{what}; give one of {', '.join(QUANTITIES)}, such as {{displacement: y, at: tip}}")
+        places, known = [name for name in ("at", "of") if getattr(self, name) is not None], QUANTITIES[self.kind][1]
+        remedy = f"give {', or '.join(f'{name}: {what}' for name, what in known.items())}" if known else "remove it"
+        if wrong := [*set(places) - known.keys(), *places[1:]]:
+            raise refuse(f"a {self.kind} has no '{wrong[0]}'{' beside at' * (len(places) > 1)}; {remedy}", wrong[0])
         if known and not places:
-            raise refuse(f"a {kind} of nothing; give {known}", kind)
-        if set(places) - set(PLACES[kind]):
-            remedy = f"give {known}" if known else "remove it"
-            raise refuse(f"a {kind} has no '{places[0]}'; {remedy}", places[0])
+            raise refuse(f"a {self.kind} of nothing; {remedy}", self.kind)
         if self.source and self.expected is None:
             raise refuse("a source of no value; give 'expected', too, or remove it", "source")
         try:
@@ -222,8 +214,8 @@ class QuantityConfig(Section):
 
     @property
     def kind(self) -> str:
-        """Key of `KINDS_OF_QUANTITY`."""
-        return next(name for name in KINDS_OF_QUANTITY if getattr(self, name))
+        """Key of `QUANTITIES`."""
+        return next(name for name in QUANTITIES if getattr(self, name))
 
     @property
     def component(self) -> str:
@@ -234,8 +226,8 @@ class QuantityConfig(Section):
     @property
     def expected_value(self) -> float | None:
         """In SI units."""
-        unit = KINDS_OF_QUANTITY[self.kind]
-        return None if self.expected is None else read_quantity(self.expected, unit, signed=True)
+        dimension = QUANTITIES[self.kind][0]
+        return None if self.expected is None else read_quantity(self.expected, dimension, signed=True)
 
 
 class ShapeLoadConfig(Section):

@@ -47,12 +47,16 @@ def files(folder: str | Path, name: str) -> tuple[Path, Path]:
     return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.h5"
 
 
-def write_made(folder: str | Path, name: str, key: str, made: GroupedMesh, known: dict[str, float]) -> None:
-    """Store a mesh and its groups."""
+def write(folder: str | Path, name: str, key: str, made: GroupedMesh | None, known: dict[str, Any]) -> None:
+    """Store a mesh and its groups; where it cannot be made, only the ``message`` that is known."""
     path, notes = files(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_mesh(path, made.mesh)
-    store.add(notes, {NOTES: {"key": key, "checksum": checksum(path), **known, "groups": _plain(made)}})
+    if made is None:
+        path.unlink(missing_ok=True)
+    else:
+        write_mesh(path, made.mesh)
+        known |= {"checksum": checksum(path), "groups": _plain(made)}
+    store.add(notes, {NOTES: {"key": key, **known}})
 
 
 def _plain(grouped: GroupedMesh) -> dict[str, Any]:
@@ -66,13 +70,6 @@ def _plain(grouped: GroupedMesh) -> dict[str, Any]:
         },
         "unusable": dict(grouped.unusable),
     }
-
-
-def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None:
-    """Store that a mesh cannot be made, with its ``message``."""
-    path, notes = files(folder, name)
-    path.unlink(missing_ok=True)
-    store.add(notes, {NOTES: {"key": key, **why}})
 
 
 def is_stored(folder: str | Path, name: str, key: str) -> bool:
@@ -102,7 +99,10 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
     (path, _), notes = files(folder, name), read_notes(folder, name)
     if "message" in notes:
         return None
-    _checked(path, notes["checksum"])
+    if not path.exists():
+        raise DamagedError(path, "it is missing")
+    if checksum(path) != notes["checksum"]:
+        raise DamagedError(path, "it is damaged (its checksum is another one)")
     mesh = read_stored(path)
     groups, count = notes["groups"], {corners: len(cells) for corners, cells in mesh.cells.items()}
     return GroupedMesh(
@@ -115,13 +115,6 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
         },
         groups["unusable"],
     )
-
-
-def _checked(path: Path, wanted: str) -> None:
-    if not path.exists():
-        raise DamagedError(path, "it is missing")
-    if checksum(path) != wanted:
-        raise DamagedError(path, "it is damaged (its checksum is another one)")
 
 
 # -- references --------------------------------------------------------------------------------------------------------
