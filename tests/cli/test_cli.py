@@ -134,7 +134,7 @@ class TestScenes:
         assert "scenes 360" in lines
         assert "meshes 18 each serves 25 scenes and curves on average" in lines
         assert "references 9 from 4 solutions: small strain scales with force, E t and size" in lines
-        assert any(line.startswith("curves 90 of 61 stiffnesses") for line in lines)
+        assert any(line.startswith("curves 90 61 stiffnesses each") for line in lines)
         assert "printed 45 cells to compare with" in lines
         assert [line for line in lines if line.startswith("table ")] == [f"table {n} 54 54 9 3 18" for n in range(1, 6)]
 
@@ -275,7 +275,7 @@ class TestPredictAMesh:
         assert heads.split()[-5:] == ["traction", "bending", "shear", "largest", "step"]
         assert f"Solved: {len(search.tried)} meshes of " in result.stdout
         assert "all finer meshes tried, up to twice as fine" in result.stdout and "linear kinematics" in result.stdout
-        assert "A definition is given up if its error, by its change over the last doubling" in result.stdout
+        assert "A definition is dropped if its error, at the rate of the last doubling" in result.stdout
 
     def test_what_is_written_is_what_is_said(self, tmp_path):
         target = tmp_path / "net.json"

@@ -35,14 +35,14 @@ class WrongCall(click.ClickException):
 COMMANDS = {
     "new": ("study", "Write a small study to begin with."),
     "run": ("run", "Run a study."),
-    "scenes": ("study", "List a study's scenes and what they share; nothing runs."),
+    "scenes": ("study", "List a study's scenes and what they share, without running it."),
     "definitions": ("study", "List the definitions of spring stiffness."),
     "predict": ("predict", "Recommend a definition for one mesh, or a mesh for one error."),
     "identify": ("identify", "Find a material's constants from measured tests."),
     "springs": ("predict", "Write the springs of one mesh for another program."),
     "browse": ("results", "Open the page of a study in a browser."),
     "info": ("results", "Show what a dataset holds, and where it comes from."),
-    "diff": ("diff", "List what changed from one dataset to another, scene by scene."),
+    "diff": ("diff", "List the values that differ between two datasets."),
     "export": ("results", "Write a group of a dataset as CSV or Parquet."),
     "archive": ("results", "Pack the results of a study into one file."),
 }
@@ -65,7 +65,7 @@ OPTIONS = {
 
 
 def in_options(message: str, command: click.Command | None) -> str:
-    """Message that begins with the name of an argument, with the option of a command in its place.
+    """Replace the name of an argument at the begin of a message by the option of a command.
 
     Examples
     --------
@@ -128,7 +128,7 @@ class Commands(click.Group):
             return super().main(*arguments, **keywords)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; its refusal is a message, with exit code 1, or 2 for an option."""
+        """Run a command; an error is a message with exit code 1, or 2 for a wrong option."""
         try:
             return super().invoke(ctx)
         except BrokenPipeError:
@@ -175,9 +175,8 @@ class Commands(click.Group):
 def main() -> None:
     """Tune the stiffness of 2-D mass-spring models against finite elements.
 
-    Studies are run by Snakemake, which `springtune run` calls. `springtune COMMAND --help` has examples of each. A
-    command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
-    wrong way.
+    `springtune run` runs a study by Snakemake. `springtune COMMAND --help` ends with examples. Exit codes: 0 done, 1
+    failed, 2 wrong options or arguments.
     """
     usual, said = warnings.showwarning, set[str]()
 

@@ -58,14 +58,14 @@ def diff(
     ignored: tuple[str, ...],
     rows: int,
 ) -> None:
-    """Say what changed from one dataset to another beyond a tolerance, scene by scene.
+    """List the values that differ between two datasets by more than a tolerance.
 
-    BEFORE and AFTER are results/<study>, or its dataset.nc. Scenes are matched by their labels, in
-    whatever order. Numbers are the same within --relative or --absolute, and NaN is NaN; along a curve or over a field
-    --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
-    not compared; versions and the studies' files are told and make no difference.
+    BEFORE and AFTER are results/<study>, or its dataset.nc. Scenes are matched by their labels. Numbers are equal
+    within --relative or --absolute, and NaN equals NaN. Along a curve or over a field, --relative is of the largest
+    number. Run times and other measurements of the machine are not compared. Versions and studies are printed, and
+    are no difference.
 
-    Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
+    Exit codes: 0 nothing changed, 1 something changed, 2 nothing could be compared.
     """
     from ..studies.output import reading
     from ..studies.output.comparison import RELATIVE, Tolerance, compare
@@ -115,7 +115,7 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int = ROWS
         parts.append(["the largest changes, measured by the tolerance", *table, *more])
     if found.attributes:
         told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
-        parts.append(["told, and no difference of results", *aligned(told, 0).splitlines()])
+        parts.append(["attributes that differ; they are no results", *aligned(told, 0).splitlines()])
     return paragraphs(parts)
 
 
@@ -127,7 +127,7 @@ def _summary(found: "Comparison", changed: int) -> str:
         said += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
     unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in groups)
     said += [f"{changed} values changed"] if changed else []
-    said += [f"{unlike} variables are not in both, or cannot be compared"] if unlike else []
+    said += [f"{unlike} variables are only in one, or cannot be compared"] if unlike else []
     result = f"different: {', '.join(said) or 'labels'};" if found.different else "the same:"
     return f"{result} {sum(one.compared for group in groups for one in (*group.flags, *group.values))} values compared"
 

@@ -75,15 +75,14 @@ def predict(
     target: Path | None,
     **engine: Any,
 ) -> None:
-    """Recommend a definition and its stiffness for one mesh, with its error under some loads; or find the mesh.
+    """Recommend a definition for one mesh, with its error under some loads, or find a mesh.
 
-    Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
-    strain. With --error, meshes from coarse to fine are solved
-    so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
-    A shape of a study has errors in the quantities that its load case asks for.
+    The network of each definition is solved on the mesh, with linear kinematics, and compared with the converged
+    reference of small strain. With --error, meshes are solved from coarse to fine, until a mesh and all finer ones
+    tried, up to twice as fine, keep this error. Errors of a shape are those of the quantities of its load case.
 
-    With --engine: what to type into an engine at a setting, so that the displacement under --load is that of finite
-    elements; the error under other loads; and which settings converge.
+    With --engine, find the factor on the stiffness that an engine needs at a setting, the errors under other loads, and
+    the settings that converge.
     """
     from .recommendation import written_text
 
@@ -247,11 +246,10 @@ def springs(
     scale: float,
     target: Path,
 ) -> None:
-    """Write the springs of a mesh: their rest lengths and stiffnesses, masses, and energies besides them.
+    """Write the springs of a mesh to a file: rest lengths, stiffnesses, masses, and energies besides springs.
 
-    The file says what its numbers are: definition, formula and source, and how far off the network is under traction,
-    bending, shear and the load that is given, solved on this very mesh; of a shape in the quantities that its load case
-    asks for.
+    The file also has the definition with its formula and source, and the network's errors on this mesh: under traction,
+    bending, shear and the given load, or of a shape in the quantities of its load case.
     """
     from ..handover.simulation import EquilibriumWarning
     from .recommendation import written_text

@@ -157,9 +157,10 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
         f"Tried: {', '.join(name for name in names if any(one.worst(name) < math.inf for one in search.tried))}.",
         f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
-        "with a margin: the last change may happen once more. Sizes between whole divisions are tried, too.",
+        "also if they change once more by as much as over the last refinement.",
+        "Sizes between whole divisions are tried, too.",
         *subject.meaning("solved on each mesh"),
-        "A definition is given up if its error, by its change over the last doubling, stays too large on finer meshes.",
+        "A definition is dropped if its error, at the rate of the last doubling, stays too large on finer meshes.",
         "Meshes are ranked by their particles. Largest step: of undamped explicit integrators, about rest, free of",
         "supports; it needs a density.",
     ]
@@ -198,11 +199,12 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
         aligned(fit._table(), left=2),
     ]
     if fit.bands:
-        converging = "" if len(fit.bands) == 1 else ": of others than the first, at what moves finite elements as far"
-        lines += ["", f"errors at shares of a load{converging}:", aligned(fit.bands.table(), left=2)]
+        others = "" if len(fit.bands) == 1 else "; other loads give finite elements the same displacement"
+        lines += ["", f"errors at parts of each load{others}:", aligned(fit.bands.table(), left=2)]
         off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > WITHIN / 2]
-        hides = f"The factor hides from {fit.scene.load} that the solver has not converged, not from {', '.join(off)}."
-        lines += [hides] if off else []
+        if off:
+            where = f"under {fit.scene.load}, but not under {', '.join(off)}"
+            lines.append(f"The solver has not converged; the factor makes up for it {where}.")
     if fit.needed:
         lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
         lines.append(aligned(fit.needed.table(), left=2))

@@ -15,7 +15,7 @@ from . import examples
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option("--study", is_flag=True, help="Print the study that made the dataset, and nothing else.")
 def info(path: Path, study: bool) -> None:
-    """Show what a dataset holds: how its scenes ended, its errors, its groups, and where it comes from.
+    """Show a dataset's scenes by status, errors, groups, versions and inputs.
 
     PATH is results/<study>, or its dataset.nc.
     """
@@ -41,7 +41,7 @@ def info(path: Path, study: bool) -> None:
 @click.option("--group", default="/", show_default=True, help="Group of the table, such as sensitivity.")
 @click.option("--force", is_flag=True, help="Replace the file if it is there.")
 def export(path: Path, target: Path, group: str, force: bool) -> None:
-    """Write a group of a dataset as a long table, one row a cell, with all its variables and dimensions.
+    """Write a group of a dataset as a long table, with a row for each combination of its labels.
 
     PATH is results/<study>, or its dataset.nc.
     """
@@ -71,10 +71,10 @@ def browse(path: Path) -> None:
 @click.option("--out", type=click.Path(path_type=Path), help="Zip file to write.  [default: results/<study>.crate.zip]")
 @click.option("--force", is_flag=True, help="Replace a file that is there.")
 def archive(folder: Path, out: Path | None, force: bool) -> None:
-    """Pack the results of a study into one zip file, to be cited and handed on.
+    """Pack the results of a study into one zip file for others.
 
-    FOLDER is results/<study>. The file is an RO-Crate: the study and the files that it names, dataset,
-    page, figures, tables, the versions of all packages, and the SHA-256 of every file.
+    FOLDER is results/<study>. The file is an RO-Crate: the study with the files that it names, the dataset, page,
+    figures, tables, the versions of all packages, and the SHA-256 of every file.
     """
     from ..studies.kinds import load_study
     from ..studies.runs.locks import claimed

@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 )
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
 def run(results: Path | None, arguments: tuple[str, ...]) -> None:
-    """Run a study, the paper's where none is named.
+    """Run a study; without a name, the paper's.
 
-    Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All options but those
-    below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
-    the study is wrong or a job failed, and with 2 when it was called in a wrong way.
+    Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All other options are
+    Snakemake's. Exit codes: 0 all is made, also if scenes could not be solved; 1 the study is wrong or a job failed; 2
+    wrong options.
     """
     from ..problem.geometry import AssumptionWarning
     from ..studies.config.messages import StudyError

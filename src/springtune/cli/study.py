@@ -21,10 +21,10 @@ from . import WrongCall, examples
 @click.argument("study")
 @click.option("--shape", is_flag=True, help="A study of a shape, an outline with a hole, rather than of a beam.")
 def new(study: str, shape: bool) -> None:
-    """Write a small study with comments, to be changed into your own; it runs as it is.
+    """Write a small study with comments, which runs, for you to change.
 
     STUDY is its name, or the path of its file. A name alone becomes config/<name>.yaml in a checkout, and <name>.yaml
-    elsewhere. What is there already is never overwritten.
+    elsewhere. Existing files are not overwritten.
     """
     path = _path(study)
     if not NAME.fullmatch(path.stem):
@@ -73,10 +73,9 @@ def template_text(path: Path, body: str) -> str:
 )
 @click.argument("config", type=click.Path(path_type=Path))
 def scenes(config: Path) -> None:
-    """Say what a study asks for, before anything runs.
+    """List a study's scenes and what they share, without running it.
 
-    Counts scenes, meshes, references and curves, and what grids share. A study with mistakes is refused with the line
-    of each.
+    Counts scenes, meshes, references and curves of each grid. Mistakes are printed with their lines.
     """
     from ..studies.config.kind import kinds
     from ..studies.config.messages import StudyError
