@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_definitions import errors, patch
 
 from periodic import periodic_delaunay
 from springtune.mechanics.energies import AngleEnergy, BiquadraticEnergy
@@ -12,6 +11,7 @@ from springtune.springs import DEFINITIONS, Springs
 from springtune.springs.ielsm import angle_moduli
 from springtune.springs.normal_shear import slip_form
 
+from patches import errors, patch
 from problems import free_network
 
 NAMES = ("normal-shear", "ielsm", "many-body")

@@ -12,37 +12,17 @@ from scipy.optimize import nnls
 
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, MeshError, lattice, signed_areas, write_mesh
-from springtune.mesh.sheets import bonded
+from springtune.mesh import MESH_TYPES, Mesh, lattice
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
 from springtune.springs.element_fit import least_squares
-from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
-from springtune.springs.searched import adjoint
 
-HEIGHT, SIZE = 20e-3, 2e-3
+from patches import HEIGHT, SIZE, disturbed, errors, patch
+
 RATIOS = (0.3, 1 / 3, 0.49)
 EVERY_RATIO = (0.0, 0.2, 0.25, 0.3, 1 / 3, 0.45, 0.49, 0.5)
-
-
-def patch(mesh_type, length=0.1):
-    """Mesh of ten cells over the height: of the exact lattice for rows of triangles, on which closed forms hold."""
-    size = HEIGHT / (10 * ROW_HEIGHT) if mesh_type == "structured" else SIZE
-    if mesh_type != "structured" and not mesh_type.startswith("isosceles"):
-        return MESH_TYPES[mesh_type](length, HEIGHT, size)
-    row_height = MESH_TYPES[mesh_type].row_height * size
-    return lattice(round(length / size), round(HEIGHT / row_height), size, row_height)
-
-
-def errors(name, mesh, nu):
-    """Error of E and G [1], and the effective Poisson's ratio."""
-    material = Material(1.0, nu, name="unit")
-    springs = DEFINITIONS[name].springs(mesh, material, 1.0)
-    young, ratio = PatchTest(mesh).axial(springs)
-    shear = PatchTest(mesh).shear(springs)
-    return young * springs.reference - 1, ratio, shear * springs.reference * 2 * (1 + nu) - 1
 
 
 # -- closed forms ------------------------------------------------------------------------------------------------------
@@ -81,13 +61,6 @@ MECHANISMS = ("cross-section", "right"), ("cross-section", "alternating"), ("for
 """Definitions that leave springs opposite right angles without stiffness."""
 
 
-def disturbed(mesh, turn, size):
-    """Renumbered, turned, made larger and moved away; its coordinates round otherwise."""
-    order = np.random.default_rng(0).permutation(len(mesh.points))
-    back, way = np.argsort(order), [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
-    return Mesh(size * (mesh.points[order] @ way + 3.0), back[mesh.triangles], back[mesh.quads])
-
-
 @pytest.mark.parametrize("mesh_type", MESH_TYPES)
 def test_a_definition_that_leaves_a_mechanism_refuses_the_mesh(mesh_type):
     """All others have three motions without resistance, clearly apart; rounding decides nothing."""
@@ -118,71 +91,6 @@ def test_even_tension_is_known_on_any_triangles(name, share, mesh_type):
     assert even_tension(name, mesh) == pytest.approx(share, rel=1e-9)
 
 
-@pytest.mark.parametrize("mesh_type", ["structured", "free", "braced"])
-@pytest.mark.parametrize("shells", [0, 1, 2, 3])
-def test_bonds_of_peridynamics_have_the_energy_of_a_sheet(mesh_type, shells):
-    """Of even strains the mean over all directions is exact, with any shells and any outline: sum k L^2 = 3 E t A."""
-    mesh = patch(mesh_type)
-    if shells:
-        mesh = bonded(mesh, (shells + 0.01) * mesh.edge_lengths.min())
-    springs = DEFINITIONS["peridynamic"].springs(mesh, Material(1.0, 1 / 3), 1.0)
-    total = (springs.relative * springs.reference * mesh.edge_lengths**2).sum()
-    assert total == pytest.approx(3 * mesh.area, rel=1e-9) and (springs.relative > 0).all()
-
-
-@pytest.mark.parametrize("mesh_type", ["right", "structured"])
-@pytest.mark.parametrize("shells", [2, 3])
-def test_bonds_do_not_depend_on_the_place_of_a_mesh(mesh_type, shells):
-    """Around a notch, whose sides and corner bonds touch in particles."""
-    mesh = MESH_TYPES[mesh_type](0.05, 0.03, 0.005)
-    x, y = mesh.points[mesh.triangles].mean(axis=1).T
-    used, corners = np.unique(mesh.triangles[(x < 0.025) | (y < 0.015)], return_inverse=True)
-    mesh = Mesh(mesh.points[used], corners.reshape(-1, 3))
-    found = set()
-    for turn in (0.0, 0.1, 1.0, np.pi / 2, 3.0):
-        for size in (1.0, 1e-3, 1e3):
-            other = disturbed(mesh, turn, size)
-            found.add(len(bonded(other, shells * other.edge_lengths.max()).edges))
-    assert len(found) == 1
-
-
-def test_peridynamics_inside_a_sheet():
-    """Far from the outline a sheet of two shells has E and nu = 1/3; near it bonds are cut, and E and G miss some."""
-    mesh = lattice(60, 40, 1.0)
-    joined = bonded(mesh, 2.01)
-    springs = DEFINITIONS["peridynamic"].springs(joined, Material(1.0, 1 / 3), 1.0)
-    middle = np.argmin(((mesh.points - mesh.points.mean(axis=0)) ** 2).sum(axis=1))
-    here = (joined.edges == middle).any(axis=1)
-    assert here.sum() == 18  # 6 neighbours, 6 at sqrt(3), 6 at 2
-    ways = np.diff(mesh.points[joined.edges[here]], axis=1)[:, 0]
-    x, y = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).T
-    weight = 0.5 * springs.relative[here] * (ways**2).sum(axis=1) / mesh.particle_areas[middle]
-    assert (weight * x**4).sum() == pytest.approx(9 / 8, rel=1e-9)  # E / (1 - nu^2)
-    assert (weight * x**2 * y**2).sum() == pytest.approx(3 / 8, rel=1e-9)
-    young, ratio = PatchTest(joined).axial(springs)
-    assert abs(young - 1) < 0.02 and abs(ratio - 1 / 3) < 0.01  # 40 rows: an outline of two shells is a tenth
-
-
-def test_bonds_do_not_cross_what_is_no_body():
-    """Of a sheet with a slot none joins its two lips; a bond between neighbours is no second spring."""
-    points = np.array([[x, y] for y in range(4) for x in range(7)], dtype=float)
-    quads = np.array([[i + 7 * j, i + 1 + 7 * j, i + 8 + 7 * j, i + 7 + 7 * j] for j in range(3) for i in range(6)])
-    slot = (quads[:, 0] // 7 == 1) & (quads[:, 0] % 7 < 5)
-    mesh = bonded(Mesh(points, np.zeros((0, 3), dtype=int), quads[~slot]), 2.3)
-    ends = points[mesh.edges]
-    lips = (ends[:, :, 0] < 5).all(axis=1) & (ends[:, :, 1].min(axis=1) <= 1) & (ends[:, :, 1].max(axis=1) >= 2)
-    assert not lips.any() and len(mesh.bonds)
-    assert ((ends[:, :, 1] == 3).all(axis=1) & (np.ptp(ends[:, :, 0], axis=1) == 2)).sum() == 5  # along a side
-    assert len(np.unique(mesh.edges, axis=0)) == len(mesh.edges)
-    assert (mesh.cells_per_edge == 0).sum() == len(mesh.bonds)
-    with pytest.raises(MeshError, match="a mesh file has no place for"):
-        write_mesh("bonds.vtu", mesh)
-    with pytest.raises(MeshError, match="reach: 0 is not above zero"):
-        bonded(mesh, 0)
-    with pytest.raises(MeshError, match="bonds: they join points up to 28 of 28; renumber them"):
-        Mesh(points, mesh.triangles, mesh.quads, np.array([[0, 28]]))
-
-
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 def test_areas_are_those_of_red_cells(nu):
     """G = sqrt(3)/4 k, K = sqrt(3)/2 k + k_d and E = 4 K G / (K + G) of bonds and areas (Fedosov 2010)."""
@@ -209,18 +117,6 @@ def test_any_poisson_ratio_is_exact(name, mesh_type, nu):
 
 
 @pytest.mark.parametrize(
-    ("mesh_type", "nu"),
-    [
-        *(("braced", nu) for nu in (0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5)),
-        *(("isosceles-0.3", 0.3), ("isosceles-0.5", 0.5), ("structured", 1 / 3)),
-    ],
-)
-def test_axis_exact_on_squares_and_on_rows_made_for_it(mesh_type, nu):
-    young, ratio, shear = errors("axis-exact", patch(mesh_type), nu)
-    assert (young, ratio, 1 + shear) == pytest.approx((0, nu, 2 * nu / (1 - nu)), abs=1e-9)
-
-
-@pytest.mark.parametrize(
     "name", sorted({name for name, one in DEFINITIONS.items() if one.needs != "cases"} - {"adjoint"})
 )
 @pytest.mark.parametrize("factor", [2.0**-12, 2.0**12])
@@ -240,16 +136,6 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
         ("patch", "force", "best")
     )
     assert name != "patch" or one.evaluations == 1
-
-
-def test_ends_of_rows_carry_what_a_strip_of_their_area_does():
-    """Half triangles at the ends of rows: each gives its edge across its area over the square of it."""
-    mesh = MESH_TYPES["isosceles-0.3"](0.03, 0.01, 2e-3)
-    relative = DEFINITIONS["axis-exact"].springs(mesh, Material(1.0, 0.3, name="unit"), 1.0).relative
-    across = np.abs(np.diff(mesh.points[mesh.edges, 0])[:, 0]) < 1e-9
-    areas = mesh.sum_to_edges({3: np.repeat(signed_areas(mesh.points, mesh.triangles)[:, None], 3, axis=1)})
-    assert across.sum() > 4 and mesh.on_outline[across].all()
-    np.testing.assert_allclose(relative[across], (areas / mesh.edge_lengths**2)[across], rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["delingette", "delingette-tensile"])
@@ -295,19 +181,6 @@ def test_rectangles(nu, shape):
     assert shear == pytest.approx(0, abs=1e-9)
     young, ratio, _ = errors("lattice", stretched, nu)
     assert (young, ratio) == pytest.approx((0, 1 / 3), abs=1e-9)
-
-
-@pytest.mark.parametrize("name", ["uniform", "lattice", "van-gelder", "element-fit", "delingette-tensile", "patch"])
-def test_mesh_fixes_poisson_ratio_of_rows(name):
-    """Only the row springs carry a load along the rows: nu = (a / 2h)^2."""
-    assert errors(name, patch("isosceles-0.5"), 0.2)[1] == pytest.approx(0.5, rel=1e-9)
-    assert errors(name, patch("right"), 0.2)[1] == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("mesh_type", ["structured", "free", "right", "alternating", "braced", "isosceles-0.5"])
-@pytest.mark.parametrize("name", ["patch", "patch-area"])
-def test_patch_makes_young_modulus_exact_on_any_mesh(name, mesh_type):
-    assert errors(name, patch(mesh_type), 0.45)[0] == pytest.approx(0, abs=1e-9)
 
 
 # -- measured tables (E and G in %, effective nu) for nu = .3, 1/3, .49 -----------------------------------------------
@@ -457,16 +330,6 @@ def test_sides_without_stiffness_are_not_refused_by_rounding(name, nu, ratio):
         assert (made.relative == 0).sum() == 20 * 6  # the edges along x
 
 
-def test_axis_exact_names_the_row_that_is_furthest_off():
-    """One row of another height: of nu = 0.2 among rows of 0.45."""
-    mesh = lattice(5, 4, 1e-3)
-    rows = np.rint(mesh.points[:, 1] / mesh.points[:, 1].max() * 4).astype(int)
-    heights = 0.5e-3 / np.sqrt([0.46, 0.2, 0.45, 0.44])
-    uneven = Mesh(np.stack([mesh.points[:, 0], np.append(0, np.cumsum(heights))[rows]], axis=1), mesh.triangles)
-    with pytest.raises(DefinitionError, match=r"nu = 0.2 and the material 0.45;.*for bases of 1 mm"):
-        DEFINITIONS["axis-exact"].springs(uneven, Material(1.0, 0.45, name="unit"), 1.0)
-
-
 @pytest.mark.parametrize(("load", "excess"), [("traction", 1), ("compression", 1), ("bending", 3)])
 def test_predicted_stiffness_is_that_of_the_lattice_less_the_full_outlines(load, excess):
     beam, material = Beam(0.2, 0.04, 1e-3, "200x40"), Material(3e9, 0.3, name="any")
@@ -479,62 +342,4 @@ def test_predicted_stiffness_is_that_of_the_lattice_less_the_full_outlines(load,
 # -- identification ----------------------------------------------------------------------------------------------------
 
 
-def test_gradient_of_the_misfit_is_exact():
-    mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
-    material = Material(5.0, 0.45, name="any")
-    misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
-    generator = np.random.default_rng(1)
-    here, direction = 0.3 * generator.standard_normal((2, len(mesh.edges)))
-    _, slope = misfit.evaluate(here)
-    difference = (misfit(here + 1e-5 * direction) - misfit(here - 1e-5 * direction)) / 2e-5
-    assert difference == pytest.approx(slope @ direction, rel=1e-7)
-
-
-def test_a_network_that_does_not_move_misses_half_of_each_case():
-    """J = 1/2 sum |u - u*|^2 / |u*|^2 at u = 0, which springs 1e12 times as stiff as asked come near to."""
-    mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material(5.0, 0.45, name="any")
-    misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
-    assert misfit(np.full(len(mesh.edges), np.log(1e12))) == pytest.approx(3 / 2, rel=1e-9)
-    assert misfit.evaluations == 1
-
-
-@pytest.mark.parametrize("nu", [0.3, 0.49])
-def test_adjoint_reaches_poisson_ratios_that_springs_cannot(nu):
-    mesh, material = MESH_TYPES["free"](0.04, 0.0133, 2.5e-3), Material(1.0, nu, name="unit")
-    springs = adjoint(mesh, material, 1.0)
-    young, ratio = PatchTest(mesh).axial(springs)
-    assert young * springs.reference == pytest.approx(1, abs=0.03)
-    # 150 particles: with 373 of them .307 and .484 have been reached.
-    assert ratio == pytest.approx(nu, abs=0.04)
-    assert springs.spring_ratio <= 100.0 * 2  # bounds of ten each way, about outline springs of half weight
-    assert 10 < springs.evaluations <= 450
-
-
-@pytest.mark.parametrize("name", ["annealed", "evolved"])
-def test_searches_are_repeatable_and_better_than_their_start(name):
-    mesh, material = MESH_TYPES["free"](0.03, 0.01, 5e-3), Material(1.0, 0.45, name="unit")
-    cases = patch_cases(mesh, material, 1.0)
-    first, second = (DEFINITIONS[name].function(mesh, material, 1.0, cases, 200) for _ in "ab")
-    assert (first.relative == second.relative).all()
-    assert first.evaluations <= 200
-    misfit = Misfit(mesh, material, 1.0, cases)
-    assert misfit(np.log(first.relative / misfit.start)) < misfit(np.zeros(len(mesh.edges)))
-
-
 # -- the stage ---------------------------------------------------------------------------------------------------------
-
-
-def test_rounding_does_not_choose_the_corner_that_is_held():
-    """A regular polygon has two lowest corners of equal x + y; coordinates differ by rounding among processors."""
-    angles, noise = np.arange(12) * np.pi / 6, np.random.default_rng(1)
-    points = np.vstack([np.zeros(2), np.column_stack([np.cos(angles), np.sin(angles)])])
-    triangles = np.array([[0, i + 1, (i + 1) % 12 + 1] for i in range(12)])
-    held = {
-        patch_cases(
-            Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
-            Material(1.0, 0.3, name="unit"),
-            1.0,
-        )[0].held.tobytes()
-        for _ in range(20)
-    }
-    assert len(held) == 1
