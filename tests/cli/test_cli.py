@@ -24,8 +24,8 @@ from springtune.prediction import choices as of_one_mesh
 from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
-from springtune.scene.sheet import Sheet
-from springtune.scene.statements import unit_reference
+from springtune.scene.boundary_problem import unit_reference
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.sections import schema_text
 from springtune.studies.kinds import load_study
@@ -341,7 +341,7 @@ class TestPredictAMesh:
     )
     def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, beam, asked, value):
         """By one line each: no mesh, no reference, no network."""
-        with counted(MeshType.__call__, unit_reference, Sheet.__init__) as calls:
+        with counted(MeshType.__call__, unit_reference, MeshCache.__init__) as calls:
             result = run("predict", "--beam", beam, asked, value, "--material", "steel")
         refusals = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
         assert not calls and result.exit_code == 2 and result.stdout == "" and len(refusals) == 1

@@ -34,7 +34,7 @@ def question(number):
     scene = engine_scenes.scene(
         body, pick(("structured", "free", "right")), load, pick(engine_scenes.MATERIALS), pick(("patch", "lattice"))
     )
-    force = scene.statement.size * random.uniform(0.2, 1.5)
+    force = scene.boundary_problem.size * random.uniform(0.2, 1.5)
     scene = st.Scene(scene.beam, scene.mesh, scene.material, load, force, definition=scene.definition)
     setting = st.Setting(
         pick((1 / 60, 1 / 120)), int(random.integers(4, 40)), int(random.integers(2, 20)), pick(("float64", "float32"))

@@ -489,10 +489,10 @@ def test_parts_of_shapes_keep_their_masses_in_mujoco(tmp_path):
     assert out_of_balance(model, data, one.solve().displacements[~one.held]) < 1e-9
     area = np.pi * 25e-6
     whole = 1e-3 * (7850 * (1.2e-3 - area) + 2700 * area)
-    assert one.statement.masses().sum() == pytest.approx(whole, rel=2e-3)
+    assert one.boundary_problem.masses().sum() == pytest.approx(whole, rel=2e-3)
     free = ~one.held.all(axis=1)
     moving = model.body_mass[1:].sum()
-    assert moving == pytest.approx(one.statement.masses()[free].sum(), rel=1e-9)
+    assert moving == pytest.approx(one.boundary_problem.masses()[free].sum(), rel=1e-9)
     assert "Other parts are of 'light'." in written(one, tmp_path, ".xml")
 
 

@@ -14,7 +14,7 @@ from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.answers import elastica
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS, Springs
 
 from problems import arch
@@ -28,7 +28,7 @@ def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
     mesh = MESH_TYPES[mesh_type](length, HEIGHT, HEIGHT / rows)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="sheet"), 1e-3)
     side = {AXIAL: HEIGHT, BENDING: HEIGHT**2 / length / 6, FACE: length, SHEAR: length}[kind]
-    return Sheet(mesh, 1e-3).problem(kind, springs), strain * 1e6 * 1e-3 * side / springs.reference
+    return MeshCache(mesh, 1e-3).problem(kind, springs), strain * 1e6 * 1e-3 * side / springs.reference
 
 
 def test_a_path_goes_through_a_limit_point():
@@ -50,7 +50,7 @@ def test_a_slender_column_buckles_at_eulers_load(definition):
     mesh = MESH_TYPES["structured"](0.2, 0.01, 1e-3)
     springs = DEFINITIONS[definition].springs(mesh, Material(210e9, 0.3, name="steel"), 1e-3)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.01**3 / 12 / (4 * 0.2**2)
-    found, restriction = buckling(Sheet(mesh, 1e-3).problem(AXIAL, springs), -euler / springs.reference)
+    found, restriction = buckling(MeshCache(mesh, 1e-3).problem(AXIAL, springs), -euler / springs.reference)
     assert found * springs.reference == pytest.approx(-euler, rel=0.02) and not restriction
 
 
@@ -145,7 +145,7 @@ def test_stiffness_contrast_is_solved_or_reported(contrast, kind):
     mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
     middle = mesh.points[mesh.edges].mean(axis=1)[:, 0]
     stiffness = 0.5 * mesh.cells_per_edge * np.where(middle // 0.02 % 2 == 0, 1.0, contrast)
-    problem = Sheet(mesh, 1.0).problem(kind, Springs(1.0, stiffness))
+    problem = MeshCache(mesh, 1.0).problem(kind, Springs(1.0, stiffness))
     found = problem.linear(1e-6)
     assert found.converged == (contrast <= 1e12)
     if found.converged:
@@ -219,7 +219,7 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     mesh = MESH_TYPES["structured"](length, height, height / 4)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="sheet"), 1e-3)
     pattern = weights(mesh, BENDING)
-    problem = Sheet(mesh, 1e-3).problem(BENDING, springs)
+    problem = MeshCache(mesh, 1e-3).problem(BENDING, springs)
     linear = float(np.tensordot(problem.slope, pattern, axes=2))
     s = ratio * length / (3 * linear)  # deflection F L^3 / 3 EI
     found = problem.nonlinear(s)

@@ -15,7 +15,7 @@ from springtune.problem.loads import FACE
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS
 
 BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")
@@ -26,7 +26,7 @@ def pressed(definition, length, height, size, nu=0.3, stiffness=None, mesh_type=
     """A sheet that stands on its lower side pressed from above, its mesh, and its reference stiffness."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="rubber"), 1e-3, stiffness)
-    return Sheet(mesh, 1e-3).problem(FACE, springs, follower), mesh, springs.reference
+    return MeshCache(mesh, 1e-3).problem(FACE, springs, follower), mesh, springs.reference
 
 
 def block(definition, nu=0.5, size=2e-3, **options):

@@ -18,7 +18,7 @@ from springtune.problem.loads import AXIAL, BENDING, FACE, LOADS, SHEAR
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import Springs
 from springtune.springs.lattice import COEFFICIENT, uniform
 
@@ -85,7 +85,7 @@ def random_curve(seed):
             if len(mesh.points) <= 400:
                 break
     kind = random.choice([AXIAL, AXIAL, AXIAL, BENDING, SHEAR, FACE])
-    problem = Sheet(mesh, 1.0).problem(kind, Springs(1.0, uniform(mesh)))
+    problem = MeshCache(mesh, 1.0).problem(kind, Springs(1.0, uniform(mesh)))
     sign, s = random.choice([-1, 1]), height * 10 ** random.uniform(-2, 0.3)
     if kind != AXIAL or sign < 0:
         small = 1e-6 * sign * height

@@ -18,8 +18,8 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
-from springtune.scene.sheet import Sheet
-from springtune.scene.statements import unit_reference
+from springtune.scene.boundary_problem import unit_reference
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS, DefinitionError
 
 from problems import pulled
@@ -270,7 +270,7 @@ class TestBodies:
             lambda: references(beam, material),
             lambda: st.find_mesh(beam, material, "1 %"),
         ):
-            with counted(unit_reference, MeshType.__call__, Sheet.__init__) as calls:
+            with counted(unit_reference, MeshType.__call__, MeshCache.__init__) as calls:
                 with pytest.raises(ValueError, match=f"^beam 'odd': .*{why}"):
                     call()
             assert not calls

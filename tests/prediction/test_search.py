@@ -8,7 +8,7 @@ from counting import counted
 from springtune.prediction.choices import in_order, predicted
 from springtune.prediction.search import FINER, asked_error, find_mesh
 from springtune.problem.status import Status
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 
 from problems import pulled
 
@@ -251,7 +251,7 @@ class TestArguments:
 
     def test_an_error_that_the_reference_cannot_tell(self):
         with (
-            counted(Sheet.__init__) as calls,
+            counted(MeshCache.__init__) as calls,
             pytest.raises(ValueError, match=r"^error: '1e-05 %' is below the error estimate of the .*; give at least "),
         ):
             find_mesh(BEAM, STEEL, "1e-05 %")

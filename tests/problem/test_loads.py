@@ -22,7 +22,7 @@ from springtune.problem.loads import (
 from springtune.problem.materials import Material
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.small_strain import solve_small_strain
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.studies.runs import plan, store
 
 from campaigns import do_stages, load_text
@@ -47,7 +47,7 @@ def lift(monkeypatch):
 def network_displacement(beam, material, force, kind, definition, size, mesh_type="structured"):
     """Displacement of a load on a linear network [m]."""
     mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
-    sheet = Sheet(mesh, beam.thickness)
+    sheet = MeshCache(mesh, beam.thickness)
     springs, _ = sheet.derive(definition, material)
     return sheet.solve(kind, springs, force, "linear").displacement
 

@@ -148,7 +148,9 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
     decrement = 0.03 if tendons else DECREMENT
     damping = damped(one, decrement)
     dashpots = damping.beta * st.SpringNet.from_scene(one, errors=False).stiffness
-    model = with_dampers(one, dashpots if tendons else (damping.alpha * one.statement.masses()).tolist(), tendons)
+    model = with_dampers(
+        one, dashpots if tendons else (damping.alpha * one.boundary_problem.masses()).tolist(), tendons
+    )
     free, data, seen = ~one.held, mujoco.MjData(model), []
     model.opt.timestep = 0.5 * one.motion(**damping.over["springs" if tendons else "mass"]).step_limit(
         "symplectic-euler"

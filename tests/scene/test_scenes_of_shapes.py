@@ -189,14 +189,14 @@ class TestEquilibrium:
     def test_of_forces_and_moments(self, kinematics):
         grouped = st.mesh_shape(self.shape, 4e-3)
         scene = st.Scene(self.shape, grouped, self.soft, "pull", definition="delingette", kinematics=kinematics)
-        solution = scene.statement.solve(scene.springs)
+        solution = scene.boundary_problem.solve(scene.springs)
         assert solution.message == ""
         moved = solution.equilibrium.displacements
         acting = scene.forces
         if kinematics == "nonlinear":
-            loading = scene.statement.loading
+            loading = scene.boundary_problem.loading
             acting = loading.dead + loading.follower.forces(moved)
-        total = acting + scene.statement.reactions(
+        total = acting + scene.boundary_problem.reactions(
             scene.springs, solution.problem.network, solution.equilibrium.displacements
         )
         place = grouped.mesh.points + (moved if kinematics == "nonlinear" else 0.0)

@@ -43,7 +43,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.scene.sheet import Loading, Sheet, solved
+from springtune.scene.mesh_cache import Loading, MeshCache, solved
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.studies.kinds.bodies.solve import solve as solve_scene
 from springtune.studies.kinds.bodies.solve import solve_beam
@@ -353,7 +353,7 @@ def audit(scene, path=True):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # thick ones are drawn, too
         beam = Beam(scene.length, scene.height, scene.thickness)
-    result = solve_scene(task, partial(solve_beam, beam, Sheet(mesh, scene.thickness), None))
+    result = solve_scene(task, partial(solve_beam, beam, MeshCache(mesh, scene.thickness), None))
     if str(result["status"]) != "solved":
         return []
     check = check_linear if scene.kinematics == "linear" else partial(check_nonlinear, mesh, masses, path)
@@ -386,7 +386,7 @@ def audit_snap(scene, path=True):
     force = float(guess * (body.follow(guess, judge=judge)[1] or 1e-3) * scene.level)
     loading = scaled(Loading(("arch",), held, pattern, given, pressure), force)
     try:
-        problem = Sheet(mesh, arch.thickness).problem(loading, springs)
+        problem = MeshCache(mesh, arch.thickness).problem(loading, springs)
         found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
     except SingularError:  # springs of no stiffness leave a mechanism
         return []

@@ -7,7 +7,7 @@ from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.loads import AXIAL
 from springtune.problem.shapes import LoadCase, Quantity, Support, Traction
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import Springs
 from springtune.springs.lattice import uniform
 
@@ -15,7 +15,7 @@ from springtune.springs.lattice import uniform
 def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind=AXIAL):
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
-    sheet = Sheet(mesh, 1.0)
+    sheet = MeshCache(mesh, 1.0)
     return sheet.problem(kind, Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
 
 

@@ -14,7 +14,7 @@ from .options import SPRING_FILES, Asked, Options, add_options, asked, check_tar
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
-    from ..scene.statements import ShapeStatement
+    from ..scene.boundary_problem import ShapeProblem
     from .recommendation import Subject
 
 ENGINE_OPTIONS: Options = {
@@ -114,16 +114,16 @@ def _under(body: Asked, names: list[str] | None) -> dict[str, Any]:
     return {"loads": check_loads(CASES if names is None else names)}
 
 
-def _statement(body: Asked) -> "ShapeStatement":
-    from ..scene.statements import ShapeStatement
+def _shape_problem(body: Asked) -> "ShapeProblem":
+    from ..scene.boundary_problem import ShapeProblem
 
-    return ShapeStatement(body.body, body.mesh, body.material, str(body.load), 1.0, "linear")
+    return ShapeProblem(body.body, body.mesh, body.material, str(body.load), 1.0, "linear")
 
 
 def _subject(body: Asked, known: Any) -> "Subject":
     from .recommendation import beam_subject, shape_subject
 
-    return beam_subject(body.body, body.material, known) if body.is_beam else shape_subject(_statement(body), known)
+    return beam_subject(body.body, body.material, known) if body.is_beam else shape_subject(_shape_problem(body), known)
 
 
 def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool) -> Answer:
@@ -135,7 +135,9 @@ def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool) -> Answer:
     if len(mesh.points) > SOLVED_PARTICLES:
         why = f"has {len(mesh.points)} particles, more than the {SOLVED_PARTICLES} that are solved here"
         raise click.ClickException(f"'{body.mesh_name}' {why}; give a coarser mesh, or make it a mesh of a study")
-    known: Any = references(body.body, body.material, **under) if body.is_beam else shape_references(_statement(body))
+    known: Any = (
+        references(body.body, body.material, **under) if body.is_beam else shape_references(_shape_problem(body))
+    )
     found = predict(body.body, body.mesh, body.material, known, **under)
     counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
     found = [choice for choice in found if not (springs_alone and choice.energies)]
@@ -176,7 +178,7 @@ def _in_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str],
     from ..engines.base import ENGINES, Setting
     from ..engines.calibration import fit_engine, runnable
     from ..prediction.choices import CASES
-    from ..scene.sheet import chosen
+    from ..scene.mesh_cache import chosen
     from ..scene.single import Scene
     from .recommendation import fit_text
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..prediction.search import MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
-    from ..scene.statements import ShapeStatement
+    from ..scene.boundary_problem import ShapeProblem
 
 
 class Subject(NamedTuple):
@@ -63,13 +63,13 @@ def beam_subject(beam: "Beam", material: "Material", known: Any) -> Subject:
     return Subject(beam.label, made_of, known, compared, True)
 
 
-def shape_subject(statement: "ShapeStatement", known: Any) -> Subject:
+def shape_subject(problem: "ShapeProblem", known: Any) -> Subject:
     """Shape of a prediction."""
-    kinds = {one.name: one.kind for one in statement.case.quantities}
+    kinds = {one.name: one.kind for one in problem.case.quantities}
     compared = {name: (one.value, kinds[name]) for name, one in known.items() if not isinstance(one, str)}
-    sides = np.ptp(statement.mesh.points, axis=0).tolist()
-    made_of = f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
-    return Subject(f"{statement.shape.name}, load {statement.load}", made_of, known, compared, False)
+    sides = np.ptp(problem.mesh.points, axis=0).tolist()
+    made_of = f"{size_text(*sides)}, {problem.named_materials}, t = {1e3 * problem.thickness:g} mm"
+    return Subject(f"{problem.shape.name}, load {problem.load}", made_of, known, compared, False)
 
 
 def prediction_text(subject: Subject, mesh_name: str, counts: str, choices: "Sequence[Choice]") -> str:
@@ -192,7 +192,7 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     """Text of a calibration."""
     from ..engines.calibration import WITHIN
 
-    about, mesh = fit.scene.statement, fit.scene.mesh
+    about, mesh = fit.scene.boundary_problem, fit.scene.mesh
     lines = [
         f"{about.body}, {mesh_name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
         f"{about.named_materials}; {about.label}; definition {fit.scene.definition.name}",

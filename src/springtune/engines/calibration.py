@@ -20,8 +20,8 @@ from ..problem.loads import LOADS
 from ..problem.shapes import Shape
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
+from ..scene.boundary_problem import ShapeProblem, unit_reference
 from ..scene.single import Scene
-from ..scene.statements import ShapeStatement, unit_reference
 from .base import ENGINES, Engine, EngineError, Setting
 from .run import DRIFT, EngineResult, complete, drift, in_engine, net_of
 
@@ -421,7 +421,7 @@ def _distance(one: EngineResult) -> float:
 
 def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
     """Loads that get a band, the scene's first."""
-    if isinstance(scene.statement, ShapeStatement):
+    if isinstance(scene.boundary_problem, ShapeProblem):
         known = scene.shape.loads
         others = check_names("loads", known if loads is None else loads, known, tuple(known), "is unknown")
     else:
@@ -500,7 +500,7 @@ def _loaded(scene: Scene, load: str, size: float) -> Scene:
     make = partial(Scene, definition=scene.definition, stiffness=scene.uniform_stiffness, sheet=scene.sheet)
     if scene.definition.needs == "cases" and load != scene.load:
         raise EngineError(f"definition '{scene.definition.name}' is fitted to load '{scene.load}' alone")
-    if isinstance(scene.statement, ShapeStatement):
+    if isinstance(scene.boundary_problem, ShapeProblem):
         return make(scene.shape, scene.grouped, scene.by_part, load, scale=size)
     return make(scene.beam, scene.mesh, scene.material, load, size)
 
@@ -508,9 +508,9 @@ def _loaded(scene: Scene, load: str, size: float) -> Scene:
 def _band(runs: _Runs, load: str, tuned: EngineResult) -> LoadBand:
     """Errors of the engine with the factor under a load of several sizes."""
     scene, nothing = runs.scene, (np.nan,) * len(SIZES)
-    base = scene.statement.size
+    base = scene.boundary_problem.size
     try:
-        if load != scene.load and not isinstance(scene.statement, ShapeStatement):
+        if load != scene.load and not isinstance(scene.boundary_problem, ShapeProblem):
             moved = unit_reference(scene.beam, scene.material, LOADS[load].kind, 1.0).displacement
             base = abs(tuned.reference / moved)
         sizes = tuple(float(share * base) for share in SIZES)

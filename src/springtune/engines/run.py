@@ -136,7 +136,7 @@ class EngineResult(Tabled, Ended):
     @cached_property
     def reference(self) -> float:
         """Displacement of the load by finite elements [m]."""
-        known, quantities = self.scene.reference_values(), self.scene.statement.case.quantities
+        known, quantities = self.scene.reference_values(), self.scene.boundary_problem.case.quantities
         return next((known[one.name] for one in quantities if one.kind == "displacement"), np.nan)
 
     @property
@@ -298,7 +298,7 @@ def complete(engine: Engine, setting: Setting) -> Setting:
 
 def drift(scene: Scene, displacements: np.ndarray) -> float:
     """Error of what is measured in the other direction, over what finite elements move along [1]; or NaN."""
-    grouped, quantities = scene.statement.grouped, scene.statement.case.quantities
+    grouped, quantities = scene.boundary_problem.grouped, scene.boundary_problem.case.quantities
     for one in quantities:
         if one.kind == "displacement":
             exact = scene.reference().at(scene.mesh.points)

@@ -32,11 +32,11 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
 from ..registry import hook
 from ..safe_io.tables import Tabled
+from ..scene.boundary_problem import BeamProblem, ShapeProblem
+from ..scene.mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, named
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
-from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
-from ..scene.statements import BeamStatement, ShapeStatement
 from ..springs.base import Definition, DefinitionError, Springs
 from .terms import Net, Terms, terms_of
 
@@ -164,10 +164,10 @@ class SpringNet(Tabled, Net):
             If the definition does not support the mesh or the material.
         """
         springs = scene.springs if springs is None else springs
-        about, forces = scene.statement, scene.statement.forces(springs)
+        about, forces = scene.boundary_problem, scene.boundary_problem.forces(springs)
         parts = _parts(scene.definition, scene.sheet, about.materials, springs, about.masses(), mesh_name, scene.held)
         header = parts["header"]
-        scale = about.scale if isinstance(about, ShapeStatement) else None
+        scale = about.scale if isinstance(about, ShapeProblem) else None
         header["load"] = {
             "name": scene.load,
             **({"force": about.force} if scale is None else {"scale": scale}),
@@ -244,7 +244,7 @@ class SpringNet(Tabled, Net):
         elif loads is not None:
             raise ValueError(f"loads: {loads!r} have expected errors on the mesh of a beam alone; give beam, too")
         chosen = definition_of(definition)
-        sheet = Sheet(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
+        sheet = MeshCache(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
         if springs is None:
             check_stiffness(chosen, stiffness)
             given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
@@ -329,7 +329,7 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
 
 def _parts(
     definition: Definition,
-    sheet: Sheet,
+    sheet: MeshCache,
     materials: Sequence[AnyMaterial],
     springs: Springs,
     inertia: np.ndarray | None,
@@ -397,7 +397,7 @@ def described(definition: Definition) -> tuple[str, str]:
 
 
 def _expected_errors(
-    sheet: Sheet,
+    sheet: MeshCache,
     definition: Definition,
     springs: Springs,
     beam: Beam,
@@ -415,12 +415,12 @@ def _expected_errors(
     for name in loads:
         if LOADS[name].kind.uniaxial or not definition.uniaxial:
             known = {name: reference_of(beam, material, name)}
-            statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear", sheet)
-            errors |= _in_words(errors_under(statement, springs, known), known)
+            problem = BeamProblem(beam, sheet.mesh, material, name, 1.0, "linear", sheet)
+            errors |= _in_words(errors_under(problem, springs, known), known)
     return errors
 
 
-def _too_many(sheet: Sheet) -> str:
+def _too_many(sheet: MeshCache) -> str:
     """Return why expected errors are not computed on so large a mesh, or an empty string."""
     from ..prediction.choices import SEARCHED_PARTICLES
 
@@ -447,7 +447,7 @@ def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
 
     if why := _too_many(scene.sheet):
         return dict.fromkeys([one.name for one in scene.case.quantities], why)
-    linear = ShapeStatement(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.sheet)
+    linear = ShapeProblem(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.sheet)
     try:
         values = linear.reference_values()
         known = References({name: QuantityReference(value, np.nan) for name, value in values.items()})
@@ -458,7 +458,7 @@ def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
 
 
 def _stable_steps(
-    sheet: Sheet,
+    sheet: MeshCache,
     springs: Springs,
     materials: Sequence[AnyMaterial],
     inertia: np.ndarray | None,

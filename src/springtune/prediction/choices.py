@@ -26,10 +26,10 @@ from ..problem.shapes import Shape
 from ..problem.status import Status
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList
+from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
+from ..scene.mesh_cache import MeshCache, chosen
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
-from ..scene.sheet import Sheet, chosen
-from ..scene.statements import BeamStatement, ShapeStatement, Statement, unit_reference
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
 CASES = ("traction", "bending", "shear")
@@ -311,29 +311,29 @@ def trial(
     """Definitions to solve on a mesh, with the arguments of `predict`."""
     more = [chosen(DEFINITIONS, name, "also").name for name in also]
     if isinstance(beam, Shape):
-        statement = ShapeStatement(beam, mesh, material, only_load(beam, load), 1.0, "linear")
-        return Trial([statement], shape_references(statement) if known is None else known, also=more)
+        problem = ShapeProblem(beam, mesh, material, only_load(beam, load), 1.0, "linear")
+        return Trial([problem], shape_references(problem) if known is None else known, also=more)
     if load is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
-    under_loads = beam_statements(beam, mesh, material, loads)
+    under_loads = beam_problems(beam, mesh, material, loads)
     named = [one.load for one in under_loads]
     known = references(beam, under_loads[0].material, named) if known is None else known
     return Trial(under_loads, {load: known[load] for load in named}, also=more)
 
 
-def beam_statements(
+def beam_problems(
     beam: Beam,
     mesh: Mesh | GroupedMesh,
     material: AnyMaterial | Mapping[str, AnyMaterial],
     loads: Iterable[str] = CASES,
-) -> list[BeamStatement]:
+) -> list[BeamProblem]:
     """Statements of 1 N in linear kinematics, one for each load."""
     is_a(mesh, Mesh, "mesh", A_MESH)
     is_a(material, Material, "material", A_MATERIAL)
     first, *others = check_loads(loads)
-    one = BeamStatement(beam, mesh, material, first, 1.0, "linear")
-    return [one, *(BeamStatement(beam, mesh, material, load, 1.0, "linear", one.sheet) for load in others)]
+    one = BeamProblem(beam, mesh, material, first, 1.0, "linear")
+    return [one, *(BeamProblem(beam, mesh, material, load, 1.0, "linear", one.sheet) for load in others)]
 
 
 def as_sure_as(known: Mapping[str, Any]) -> float:
@@ -366,12 +366,12 @@ def only_load(shape: Shape, load: str | None) -> str:
     return next(iter(shape.loads))
 
 
-def shape_references(statement: ShapeStatement) -> References:
+def shape_references(problem: ShapeProblem) -> References:
     """References of the quantities of a load case, each found or missing by itself."""
     from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
-    case, as_read = statement.case, statement.grouped if statement.shape.file else None
-    solved, lacking = solve_each(statement.shape, case, statement.by_part, as_read)
+    case, as_read = problem.case, problem.grouped if problem.shape.file else None
+    solved, lacking = solve_each(problem.shape, case, problem.by_part, as_read)
     found = References(lacking)
     for one in solved:
         found |= {
@@ -384,17 +384,17 @@ def shape_references(statement: ShapeStatement) -> References:
     return {one.name: found[one.name] for one in case.quantities}
 
 
-def errors_under(statement: Statement, springs: Springs, known: References) -> dict[str, float | str]:
+def errors_under(problem: BoundaryProblem, springs: Springs, known: References) -> dict[str, float | str]:
     """Errors [1] by load of a beam or quantity of a shape; NaN without a reference, or why the network fails."""
-    labels = [statement.load] if isinstance(statement, BeamStatement) else list(known)
+    labels = [problem.load] if isinstance(problem, BeamProblem) else list(known)
     try:
-        found = statement.solve(springs)
+        found = problem.solve(springs)
     except SingularError as error:
         return dict.fromkeys(labels, f"unstable: {error}")
     if found.status is not Status.SOLVED:
         return dict.fromkeys(labels, found.message)
-    of_beam = isinstance(statement, BeamStatement)
-    values = {statement.load: found.displacement} if of_beam else statement.values(springs, found)
+    of_beam = isinstance(problem, BeamProblem)
+    values = {problem.load: found.displacement} if of_beam else problem.values(springs, found)
     wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
     return dict(quantity_errors({name: values[name] for name in labels}, wanted))
 
@@ -415,19 +415,19 @@ class Trial:
 
     def __init__(
         self,
-        statements: Sequence[Statement],
+        problems: Sequence[BoundaryProblem],
         known: References,
         among: Iterable[str] | None = None,
         also: Iterable[str] = (),
     ) -> None:
-        self.statements, self.known, first = statements, known, statements[0]
+        self.problems, self.known, first = problems, known, problems[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
         self._sheet = first.sheet
-        self._sheet.networks = len({one.loading.held.tobytes() for one in statements})
+        self._sheet.networks = len({one.loading.held.tobytes() for one in problems})
         self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
-        self._test = PatchTest(self.mesh) if isinstance(first, BeamStatement) else None
+        self._test = PatchTest(self.mesh) if isinstance(first, BeamProblem) else None
         self._springs: dict[str, Springs] = {}
         self._first: dict[tuple[object, ...], str] = {}  # definition by its springs
         self._also = tuple(also)
@@ -441,7 +441,7 @@ class Trial:
         """Springs of a definition, derived once; None where it has none, for a reason in `failures`."""
         if name not in self.same and name not in self.failures:
             try:
-                springs = self.statements[0].springs(DEFINITIONS[name], None)[0]
+                springs = self.problems[0].springs(DEFINITIONS[name], None)[0]
             except DefinitionError as error:
                 self.failures[name] = {"springs": str(error)}
             except SingularError as error:
@@ -461,14 +461,14 @@ class Trial:
         """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
         if (name := self.same[name]) not in self._errors:
             if (first := self._alike(name)) not in self._errors:
-                each = (errors_under(one, self._springs[name], self.known) for one in self.statements)
+                each = (errors_under(one, self._springs[name], self.known) for one in self.problems)
                 self._errors[first] = {label: error for one in each for label, error in one.items()}
             self._errors[name] = self._errors[first]
         return self._errors[name]
 
     def _alike(self, name: str) -> str:
         """The first definition with the same stiffness matrix, and so the same errors, by its forces on some motion."""
-        springs, first = self._springs[name], self.statements[0]
+        springs, first = self._springs[name], self.problems[0]
         if any(one.kind == "stress" for one in first.case.quantities):  # that is of single springs
             return name
         motion = np.random.default_rng(0).standard_normal(self.mesh.points.shape)
@@ -514,7 +514,7 @@ class Trial:
         found = self.errors(name)
         failures = {label: error for label, error in found.items() if isinstance(error, str)}
         if failures and self._test is None:
-            failures = {self.statements[0].load: next(iter(failures.values()))}
+            failures = {self.problems[0].load: next(iter(failures.values()))}
         young = poisson = nan
         if self._test is not None:
             key = key_of(springs)
@@ -542,10 +542,10 @@ class Trial:
 
     def step_limit(self, name: str) -> float:
         """Largest stable explicit step [s]; NaN without masses or where it is not found."""
-        inertia = self.statements[0].masses()
+        inertia = self.problems[0].masses()
         if inertia is None:
             return nan
-        steps = stable_steps(Sheet(self.mesh, self.thickness), self._springs[name], inertia, ["central-difference"])
+        steps = stable_steps(MeshCache(self.mesh, self.thickness), self._springs[name], inertia, ["central-difference"])
         return nan if isinstance(steps, str) else float(steps["central-difference"])
 
 
@@ -557,7 +557,7 @@ IN_WORDS = (
 """Words for energies besides areas."""
 
 
-def in_words(sheet: Sheet, springs: Springs) -> tuple[float, float, str]:
+def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = sheet.mesh
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1

@@ -27,8 +27,8 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import quantity
 from ..problem.shapes import Shape
 from ..safe_io.tables import Tabled, mesh_size_text
+from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
 from ..scene.meshes import A_MATERIAL, is_a
-from ..scene.statements import ShapeStatement, Statement
 from .choices import (
     CASES,
     SEARCHED_PARTICLES,
@@ -36,7 +36,7 @@ from .choices import (
     References,
     Trial,
     as_sure_as,
-    beam_statements,
+    beam_problems,
     check_beam,
     check_loads,
     check_names,
@@ -350,7 +350,7 @@ def find_mesh(
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
         load = only_load(beam, load)
         families = [_shape_family(beam, material, load, make or partial(mesh_shape, beam))]
-        known = shape_references(cast(ShapeStatement, families[0].statements(families[0].side / 4)[0]))
+        known = shape_references(cast(ShapeProblem, families[0].problems(families[0].side / 4)[0]))
         what, remedy = f"load {load!r}", "; take it out of the quantities"
     elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
@@ -384,14 +384,14 @@ class _Family:
     """Meshes of a body that differ in their size.
 
     `side` is the smaller side of the body [m], which no mesh size exceeds; `one_cell` the mesh size of one cell across
-    it. From a mesh size [m] come about how many `particles`, and `statements` on the mesh.
+    it. From a mesh size [m] come about how many `particles`, and `problems` on the mesh.
     """
 
     name: str
     side: float
     one_cell: float
     particles: Callable[[float], float]
-    statements: Callable[[float], Sequence[Statement]]
+    problems: Callable[[float], Sequence[BoundaryProblem]]
 
 
 def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: str) -> _Family:
@@ -402,7 +402,7 @@ def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: s
         min(box),
         beam.height / make.row_height if beam.height <= beam.length else beam.length,
         partial(make.particles, *box),
-        lambda size: beam_statements(beam, make(*box, size), material, loads),
+        lambda size: beam_problems(beam, make(*box, size), material, loads),
     )
 
 
@@ -424,7 +424,7 @@ def _shape_family(
         side,
         side,
         lambda size: shape.area / (ROW_HEIGHT * size**2),
-        lambda size: [ShapeStatement(shape, make(size), material, load, 1.0, "linear")],
+        lambda size: [ShapeProblem(shape, make(size), material, load, 1.0, "linear")],
     )
 
 
@@ -513,8 +513,8 @@ class _Search:
         known = self._meshes.get(self._keys.get(cells, b""))
         if known and all(name in known.errors for name in names):
             return known
-        statements = self.family.statements(self._size(cells))
-        mesh = statements[0].mesh
+        problems = self.family.problems(self._size(cells))
+        mesh = problems[0].mesh
         # A mesh of its own has more particles than coarser ones and fewer than finer ones.
         others = [one for one in self.solved if one.cells == int(one.cells) != cells] if whole else []
         if any((len(mesh.points) > one.particles) != (cells > one.cells) for one in others):
@@ -524,7 +524,7 @@ class _Search:
         found = self._meshes.get(key, new)
         errors, energies = dict(found.errors), found.energies
         left = [name for name in names if name not in errors]
-        tried = Trial(statements, self.known, left if self._meshes else None)
+        tried = Trial(problems, self.known, left if self._meshes else None)
         for name in tried.names:
             springs = tried.springs(name)
             one = dict.fromkeys(self.known, "") if springs is None else tried.errors(name)
@@ -537,7 +537,7 @@ class _Search:
         """The best of some definitions on a mesh."""
         one = self._meshes[self._keys[cells]]
         name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
-        tried = Trial(self.family.statements(one.size), self.known, [name])
+        tried = Trial(self.family.problems(one.size), self.known, [name])
         return MeshChoice(
             self.family.name,
             one.size,

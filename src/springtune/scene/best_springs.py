@@ -14,8 +14,8 @@ from ..problem.quantities import positive
 from ..safe_io.tables import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
+from .mesh_cache import chosen, named
 from .meshes import A_MATERIAL, A_MESH, check_filled, is_a
-from .sheet import chosen, named
 
 STARTS = ("van-gelder", "lattice", "energy-fit")
 """Definitions from whose springs searches start."""

@@ -15,7 +15,7 @@ from ..registry import hook
 from ..safe_io.tables import Tabled
 from ..springs.base import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
-from .sheet import Sheet
+from .mesh_cache import MeshCache
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ LEAST_RATIO = 1e-9
 """Least ratio of a stiffness; the largest is one over it [1]."""
 
 
-def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
+def follow(sheet: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
     """Equilibrium path of springs of one stiffness, as far as `loads` need it: force over stiffness [m], one sign."""
     problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
     return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)

@@ -25,9 +25,9 @@ from ..registry import hook
 from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
+from .mesh_cache import chosen
 from .meshes import is_a
 from .residuals import FEWEST_POINTS, excess, measured
-from .sheet import chosen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from ..mesh.types import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive
-from .sheet import chosen
+from .mesh_cache import chosen
 
 FILLED = 1e-6
 """Largest gap between a mesh and its beam, over the beam's extent."""

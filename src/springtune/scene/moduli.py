@@ -9,8 +9,8 @@ from ..mechanics.moduli import PatchTest
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, Material
 from ..springs.base import DefinitionError, Springs
+from .mesh_cache import AnyDefinition, MeshCache, definition_of, named
 from .meshes import A_MATERIAL, A_MESH, is_a
-from .sheet import AnyDefinition, Sheet, definition_of, named
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class MeshModuli:
     """Patch tests of many definitions on one mesh; networks that differ in reference stiffness alone once."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self.sheet = Sheet(mesh, 1.0)
+        self.sheet = MeshCache(mesh, 1.0)
         self._test = PatchTest(mesh)
         self._found: dict[tuple[object, ...], tuple[float, float, float]] = {}
 

@@ -10,11 +10,11 @@ from ..mechanics.dynamics import Motion, masses
 from ..mechanics.network import Network
 from ..problem.loads import LoadKind
 from ..springs.base import Springs
-from .sheet import Sheet
+from .mesh_cache import MeshCache
 
 
 def motion_of(
-    sheet: Sheet, kind: LoadKind, springs: Springs, density: float, force: float = 0.0, **options: Any
+    sheet: MeshCache, kind: LoadKind, springs: Springs, density: float, force: float = 0.0, **options: Any
 ) -> Motion:
     """Springs of a sheet with their masses under a force with its sign [N]; density in kg/m3."""
     inertia = masses(sheet.mesh, density, sheet.thickness) / springs.reference
@@ -23,7 +23,7 @@ def motion_of(
 
 
 def stable_steps(
-    sheet: Sheet, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
+    sheet: MeshCache, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
 ) -> dict[str, float] | str:
     """Largest stable steps [s] about rest, undamped, by integrator, infinite if any step is stable; or why not found.
 

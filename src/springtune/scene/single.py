@@ -25,14 +25,14 @@ from ..problem.status import Status
 from ..registry import hook
 from ..safe_io.tables import Tabled, number_text
 from ..springs.base import Springs
-from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
-from .statements import BeamStatement, ShapeStatement, Statement
+from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
+from .mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..mechanics.dynamics import Motion
-    from .statements import AnyReference
+    from .boundary_problem import AnyReference
 
 
 class Scene(Tabled):
@@ -59,15 +59,15 @@ class Scene(Tabled):
         Uniform stiffness [N/m], or a text with its unit, for definitions that need one.
     scale : float, optional
         Factor on all that the load case of a shape prescribes, forces and displacements [1].
-    sheet : Sheet, optional
+    sheet : MeshCache, optional
         Of another scene of the same mesh and thickness, to compute once what the two share.
 
     Attributes
     ----------
-    sheet : Sheet
+    sheet : MeshCache
         What scenes of the same mesh and thickness can share.
-    statement : BeamStatement or ShapeStatement
-        Supports, forces, quantities and reference, see `springtune.scene.statements`.
+    boundary_problem : BeamProblem or ShapeProblem
+        Supports, forces, quantities and reference, see `springtune.scene.boundary_problem`.
     definition : Definition
     uniform_stiffness : float or None
         The stiffness that was given [N/m].
@@ -152,37 +152,37 @@ class Scene(Tabled):
         kinematics: str = "nonlinear",
         stiffness: float | str | None = None,
         scale: float = 1.0,
-        sheet: Sheet | None = None,
+        sheet: MeshCache | None = None,
     ) -> None:
         if kinematics not in KINEMATICS:
             raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
         self.kinematics = kinematics
-        self.statement: Statement
+        self.boundary_problem: BoundaryProblem
         if isinstance(beam, Shape):
             if force is not None:
                 raise ValueError(f"force: {force!r} is not used, since loads of a shape have their sizes; give scale")
-            about = self.statement = ShapeStatement(beam, mesh, material, load, scale, kinematics, sheet)
+            about = self.boundary_problem = ShapeProblem(beam, mesh, material, load, scale, kinematics, sheet)
             self.shape, self.grouped, self.case, self.scale = beam, about.grouped, about.case, about.scale
             self.by_part = about.by_part
         else:
             if scale != 1:
                 raise ValueError(f"scale: {scale!r} is of loads of shapes alone; give another force")
-            of_beam = self.statement = BeamStatement(beam, mesh, material, load, force, kinematics, sheet)
+            of_beam = self.boundary_problem = BeamProblem(beam, mesh, material, load, force, kinematics, sheet)
             self.beam, self.material, self.kind = beam, of_beam.material, of_beam.kind
             self.force, self.follower = of_beam.force, of_beam.follower
-        self.mesh, self.sheet, self.load = self.statement.mesh, self.statement.sheet, load
+        self.mesh, self.sheet, self.load = self.boundary_problem.mesh, self.boundary_problem.sheet, load
         self.definition = definition_of(definition)
-        self.statement.check(self.definition)
+        self.boundary_problem.check(self.definition)
         self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
         check_stiffness(self.definition, stiffness)
 
     def __repr__(self) -> str:
-        about = self.statement
+        about = self.boundary_problem
         what = f"{about.body}, {len(self.mesh.points)} particles, {about.named_materials}, {about.label}"
         return f"Scene({what}, {self.definition.name}, {self.kinematics})"
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        about = self.statement
+        about = self.boundary_problem
         yield "body", f"{about.body}, {1e3 * about.thickness:g} mm thick"
         yield "mesh", f"{len(self.mesh.points)} particles, {len(self.mesh.edges)} springs"
         yield "material", about.named_materials
@@ -193,7 +193,7 @@ class Scene(Tabled):
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
         with named(self.definition):
-            return self.statement.springs(self.definition, self.uniform_stiffness)
+            return self.boundary_problem.springs(self.definition, self.uniform_stiffness)
 
     @cached_property
     def springs(self) -> "SceneSprings":
@@ -204,7 +204,7 @@ class Scene(Tabled):
     @property
     def title(self) -> str:
         """Load in words."""
-        return self.statement.label
+        return self.boundary_problem.label
 
     def displacement_of(self, displacements: np.ndarray) -> float:
         """Displacement of the load [m]; of a shape the first one that its load case asks for, NaN where there is none.
@@ -218,17 +218,17 @@ class Scene(Tabled):
         -------
         float
         """
-        return self.statement.displacement(displacements)
+        return self.boundary_problem.displacement(displacements)
 
     @property
     def held(self) -> np.ndarray:
         """Directions of the particles that are held, shape (n_points, 2)."""
-        return self.statement.loading.held
+        return self.boundary_problem.loading.held
 
     @property
     def forces(self) -> np.ndarray:
         """Forces of the load on the particles at rest [N], shape (n_points, 2)."""
-        return self.statement.forces(self.springs)
+        return self.boundary_problem.forces(self.springs)
 
     @property
     def network(self) -> Network:
@@ -238,7 +238,7 @@ class Scene(Tabled):
     @property
     def problem(self) -> StaticProblem:
         """Network under the pattern of the load."""
-        return self.sheet.problem(self.statement.loading, self.springs)
+        return self.sheet.problem(self.boundary_problem.loading, self.springs)
 
     def solve(self) -> "Result":
         """Solve the equilibrium under the force.
@@ -257,11 +257,11 @@ class Scene(Tabled):
         try:
             springs, derived = self._derived
             begin = time.perf_counter()
-            solution = self.statement.solve(springs)
+            solution = self.boundary_problem.solve(springs)
         except SingularError as error:  # of the network, or of the patch test that scales springs
             seconds = time.perf_counter() - begin
             times = (0.0, seconds) if derived is None else (seconds, derived)
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.statement.none())
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.boundary_problem.none())
         return Result(
             self,
             solution.equilibrium,
@@ -271,7 +271,7 @@ class Scene(Tabled):
             solution.displacement,
             time.perf_counter() - begin,
             derived,
-            self.statement.values(springs, solution),
+            self.boundary_problem.values(springs, solution),
         )
 
     @property
@@ -286,7 +286,7 @@ class Scene(Tabled):
     @cached_property
     def _law(self) -> str:
         """Law at finite strain of the reference, or none."""
-        return self.statement.law(self.definition)
+        return self.boundary_problem.law(self.definition)
 
     def reference(self) -> "AnyReference":
         """Solve finite elements under the same force or load case until they converge.
@@ -319,7 +319,7 @@ class Scene(Tabled):
         >>> print(f"{1e3 * scene.reference().displacement:.0f} mm, error {100 * scene.solve().error:+.1f} %")
         64 mm, error -0.1 %
         """
-        return self.statement.reference(self._law)
+        return self.boundary_problem.reference(self._law)
 
     def reference_values(self) -> dict[str, float]:
         """Quantities of interest of the reference by name, in SI units.
@@ -328,7 +328,7 @@ class Scene(Tabled):
         -------
         dict of str to float
         """
-        return self.statement.reference_values(self._law)
+        return self.boundary_problem.reference_values(self._law)
 
     @property
     def objection(self) -> str:
@@ -336,7 +336,7 @@ class Scene(Tabled):
 
         Empty where it does, as in linear kinematics, and where the reference is one at finite strain.
         """
-        return "" if self.kinematics == "linear" or self.finite_strain else self.statement.objection()
+        return "" if self.kinematics == "linear" or self.finite_strain else self.boundary_problem.objection()
 
     def motion(self, released: bool = False, **options: Any) -> "Motion":
         """Motion of the scene from rest, its force switched on and kept; free of damping.
@@ -366,9 +366,9 @@ class Scene(Tabled):
         >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
         622 ns
         """
-        inertia = self.statement.masses()
+        inertia = self.boundary_problem.masses()
         if inertia is None:
-            name = self.statement.named_materials
+            name = self.boundary_problem.named_materials
             raise ValueError(f"density: material {name!r} has none; give a density such as '7850 kg/m^3'")
         if self.problem.given is not None:
             raise ValueError(f"load: {self.load!r} prescribes displacements, and motions have forces; take another")
@@ -441,11 +441,11 @@ class Scene(Tabled):
 
         if self.problem.given is not None:
             raise ValueError(f"load: {self.load!r} prescribes displacements, and buckling loads are of forces")
-        begin = self.statement.factor(self.springs)
+        begin = self.boundary_problem.factor(self.springs)
         load, restriction = buckling(self.problem, begin)
         if restriction and np.isfinite(load):
             warnings.warn(restriction, AssumptionWarning, stacklevel=2)
-        return float(abs(load / begin * self.statement.size))
+        return float(abs(load / begin * self.boundary_problem.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -517,7 +517,7 @@ class Result(Tabled):
     values: dict[str, float]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        about = self.scene.statement
+        about = self.scene.boundary_problem
         yield "status", str(self.status)
         yield "reason", self.message
         yield "scene", f"{about.body}, {about.label}, {self.scene.definition.name}, {self.scene.kinematics}"
@@ -603,7 +603,7 @@ class Result(Tabled):
     def sign_words(self) -> dict[str, str]:
         """As `sign_word`, of each quantity of interest by name."""
         known = self.scene.reference_values()
-        kinds = {one.name: one.kind for one in self.scene.statement.case.quantities}
+        kinds = {one.name: one.kind for one in self.scene.boundary_problem.case.quantities}
         return {name: sign_word(error, known.get(name, np.nan), kinds[name]) for name, error in self.errors.items()}
 
     def write(self, path: str | Path) -> list[Path]:

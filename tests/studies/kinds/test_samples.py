@@ -16,7 +16,7 @@ from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.answers import unit_scales
 from springtune.reference.small_strain import solve_unit
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS
 from springtune.studies.kinds.samples import designs, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
@@ -165,20 +165,20 @@ class TestOnce:
         type_name = type_name if 3 in DEFINITIONS[name].cells else "braced"
         mesh = MESH_TYPES[type_name](0.1, 0.04, 0.01)
         kind, modulus, thickness, force = LOADS["traction"].kind, 3.7e9, 2.3e-3, 123.0
-        unit, own = Sheet(mesh, 1.0), Sheet(mesh, thickness)
+        unit, own = MeshCache(mesh, 1.0), MeshCache(mesh, thickness)
         once = unit.solve(kind, unit.derive(name, Material(1.0, 0.3))[0], 1.0, "linear").displacement
         solved = own.solve(kind, own.derive(name, Material(modulus, 0.3))[0], force, "linear").displacement
         assert solved == pytest.approx(force / (modulus * thickness) * once, rel=1e-9)
 
     @pytest.mark.parametrize("name", ["uniform", "lattice", "area", "delingette"])
     def test_a_sheet_like_another_has_the_same_numbers_to_the_bit(self, name):
-        before = Sheet(MESH_TYPES["structured"](0.1, 0.04, 0.01), 1.0)
+        before = MeshCache(MESH_TYPES["structured"](0.1, 0.04, 0.01), 1.0)
         kind = LOADS["bending"].kind
         before.solve(kind, before.derive(name, Material(1.0, 0.3))[0], 1.0, "linear")
         box = (0.103, 0.0391, 0.01)
         answers = []
         for like in (None, before):
-            sheet = Sheet(MESH_TYPES["structured"](*box), 1.0, like=like)
+            sheet = MeshCache(MESH_TYPES["structured"](*box), 1.0, like=like)
             springs, _ = sheet.derive(name, Material(1.0, 0.3))
             answers += [sheet.solve(kind, springs, 1e-4, how).displacement for how in ("linear", "nonlinear")]
         assert answers[:2] == answers[2:]
@@ -189,7 +189,7 @@ class TestOnce:
         for row in range(0, data.sizes["sample"], 7):
             one = data.isel(sample=row)
             box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
-            sheet = Sheet(MESH_TYPES["structured"](*box), float(one.thickness))
+            sheet = MeshCache(MESH_TYPES["structured"](*box), float(one.thickness))
             for load in ("traction", "compression"):
                 for name in ("lattice", "area"):
                     material = Material(float(one.young_modulus), float(one.poisson_ratio))
@@ -287,7 +287,7 @@ class TestRuns:
     def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
         one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
         box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
-        sheet = Sheet(MESH_TYPES["structured"](*box), float(one.thickness))
+        sheet = MeshCache(MESH_TYPES["structured"](*box), float(one.thickness))
         springs, _ = sheet.derive("uniform", Material(float(one.best_stiffness) / float(one.thickness), 0.3))
         found = sheet.solve(LOADS["traction"].kind, springs, float(one.force), "linear").displacement
         # Springs of k have sqrt(3)/2 E t = k at that E.

@@ -17,7 +17,7 @@ from springtune.mesh.rows import structured
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.boundary import held, measured, weights
 from springtune.reference import calculix
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 
 
 def network(scene, size, clock, definition, mesh_type):
@@ -46,8 +46,8 @@ def _made(mesh_type, beam, size):
 
 
 def _problem(scene, mesh, definition):
-    """Sheet, springs and static problem; forces that a definition adds to a load are left out."""
-    sheet = Sheet(mesh, scene.beam.thickness)
+    """Mesh cache, springs and static problem; forces that a definition adds to a load are left out."""
+    sheet = MeshCache(mesh, scene.beam.thickness)
     springs = replace(sheet.derive(definition, scene.material)[0], lateral=0.0)
     sheet.measured(scene.kind)
     return sheet, springs, sheet.problem(scene.kind, springs)

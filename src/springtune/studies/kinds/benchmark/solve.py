@@ -23,8 +23,8 @@ from springtune.problem.materials import Material, material_of
 from springtune.problem.status import Status
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
+from springtune.scene.mesh_cache import MeshCache
 from springtune.scene.motion import motion_of
-from springtune.scene.sheet import Sheet
 from springtune.springs.base import DefinitionError
 
 from ...runs.attempts import own_reason
@@ -171,7 +171,7 @@ def explicit(scene, sizes, updates=UPDATES):
     """Rows of the nonlinear springs a second that explicit steps advance."""
     for size in sizes:
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
-        sheet = Sheet(mesh, scene.beam.thickness)
+        sheet = MeshCache(mesh, scene.beam.thickness)
         springs, _ = sheet.derive("lattice", scene.material)
         motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force)
         step = 0.9 * motion.step_bound("central-difference")

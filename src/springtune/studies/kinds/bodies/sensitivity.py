@@ -14,15 +14,15 @@ from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.status import Status
 from springtune.reference.answers import objection
 from springtune.scene.curve import ending, follow, meeting
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 
 from . import any_reference, stored
 
 
 def prepare(file, content):
-    """Sheet of a mesh, and the folder of references."""
+    """Cache of a mesh, and the folder of references."""
     # Curves depend on stiffnesses alone, so the thickness is 1 m.
-    return Sheet(stored.prepared(content, file).mesh, 1.0), Path(content["results"]) / "references"
+    return MeshCache(stored.prepared(content, file).mesh, 1.0), Path(content["results"]) / "references"
 
 
 def failed(curve, why):

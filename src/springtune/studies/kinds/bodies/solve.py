@@ -15,8 +15,8 @@ from springtune.problem.loads import LOAD_KINDS, Load
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 from springtune.reference.answers import field_error, interpolate
-from springtune.scene.sheet import Sheet, definition_of, named
-from springtune.scene.statements import BeamStatement, ShapeStatement
+from springtune.scene.boundary_problem import BeamProblem, ShapeProblem
+from springtune.scene.mesh_cache import MeshCache, definition_of, named
 from springtune.springs.base import DEFINITIONS, DefinitionError
 
 from ...runs.source import hash_of
@@ -56,7 +56,7 @@ def prepare(file, content):
         return None if unit is None else reference["displacement"] * unit
 
     beam = Beam(*file["beam"])
-    return partial(solve_beam, beam, Sheet(mesh, beam.thickness), field)
+    return partial(solve_beam, beam, MeshCache(mesh, beam.thickness), field)
 
 
 def failed(task, why):
@@ -118,7 +118,7 @@ def solve_beam(beam, sheet, field, task):
     springs, seconds = sheet.derive(definition, material, stiffness, (kind, force, wanted))
     springs = replace(springs, reference=task.get("stiffness_scale", 1) * springs.reference)
     load = Load(kind, copysign(1, force), task["follower"])
-    about = BeamStatement(beam, sheet.mesh, material, load, abs(force), kinematics, sheet)
+    about = BeamProblem(beam, sheet.mesh, material, load, abs(force), kinematics, sheet)
     solution, result = _solved(about, springs, seconds, task)
     found = solution.equilibrium
     result |= {
@@ -163,7 +163,7 @@ def solve_shape(described, grouped, sheets, task):
     definition, sheet = definition_of(task["definition"]), sheets.get(shape.thickness)
     try:
         check_case(grouped, case)
-        about = ShapeStatement(shape, grouped, materials, ONE_LOAD, 1.0, kinematics, sheet)
+        about = ShapeProblem(shape, grouped, materials, ONE_LOAD, 1.0, kinematics, sheet)
         about.check(definition)
         sheets[shape.thickness] = about.sheet
         with named(definition):

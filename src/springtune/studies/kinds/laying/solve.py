@@ -26,7 +26,7 @@ from springtune.problem.compare import band
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
 RIGID = 1e4
@@ -118,7 +118,7 @@ def lay(strip, trapezoid, material, support, definition, size, *, loading="press
 def _strip(strip, trapezoid, material, definition, size, loading, pressure):
     made = MESH_TYPES["structured"](strip.length, strip.height, size)
     mesh = Mesh(made.points + [-0.5 * strip.length, trapezoid.height], made.triangles, made.quads)
-    sheet = Sheet(mesh, strip.thickness)
+    sheet = MeshCache(mesh, strip.thickness)
     springs, _ = sheet.derive(definition, material)
     held = np.zeros(mesh.points.shape, dtype=bool)
     # Without friction the strip would slide off to one side.
@@ -145,7 +145,7 @@ def _support(strip, trapezoid, material, size):
     y = made.points[:, 1]
     width = trapezoid.lower_base + (trapezoid.upper_base - trapezoid.lower_base) * y / trapezoid.height
     mesh = Mesh(np.stack([(made.points[:, 0] / mean - 0.5) * width, y], axis=1), made.triangles)
-    sheet = Sheet(mesh, strip.thickness)
+    sheet = MeshCache(mesh, strip.thickness)
     springs, _ = sheet.derive("delingette", material)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.lexsort((np.abs(mesh.points[:, 0]), y))[0], 0] = True

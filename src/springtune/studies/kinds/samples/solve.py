@@ -14,7 +14,7 @@ from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
-from springtune.scene.sheet import Sheet
+from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
 from ...runs import store
@@ -99,8 +99,8 @@ def _solve_mesh(block, box, rows, like, scaling, attempts):
 
     # One network at a time: the next one takes over the symbolic factor.
     mesh_type = MESH_TYPES[block.file["mesh_type"]]
-    sheet = attempt(block.file["meshed"], lambda: Sheet(mesh_type(*box), 1.0, networks=1, like=like))
-    if not isinstance(sheet, Sheet):
+    sheet = attempt(block.file["meshed"], lambda: MeshCache(mesh_type(*box), 1.0, networks=1, like=like))
+    if not isinstance(sheet, MeshCache):
         for key in block.missing if sheet else ():
             block.keep(key, rows, 1.0, sheet)
         return None
@@ -134,7 +134,7 @@ def _failed(why):
 def _objection(sheet, scene, drawn, row):
     """Return why results of a definition do not scale on a mesh, or an empty string; None without a result."""
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
-    own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
+    own, load = MeshCache(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
     answers = [_solved(sheet, scene, ratio, load), _solved(own, scene, ratio, 1.0, modulus)]
     unit, answer = (one["displacement"] for one in answers)
     if not np.isfinite([unit, answer]).all():

@@ -25,8 +25,8 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, FACE
 from springtune.problem.materials import Material, material_of
 from springtune.problem.status import Status
+from springtune.scene.mesh_cache import MeshCache
 from springtune.scene.motion import motion_of
-from springtune.scene.sheet import Sheet
 from springtune.springs.base import DefinitionError, Springs
 
 from . import AXES
@@ -81,7 +81,7 @@ class Setup:
         return replace(self.springs(mesh), lateral=0.0)
 
     def sheet(self, mesh):
-        """Sheet of a mesh."""
+        """Cache of a mesh."""
         return _sheet(mesh, self.beam.thickness)
 
     def problem(self, mesh, kind=AXIAL, follower=False):
@@ -104,7 +104,7 @@ class Setup:
 
 @lru_cache(maxsize=1)
 def _sheet(mesh, thickness):
-    return Sheet(mesh, thickness)
+    return MeshCache(mesh, thickness)
 
 
 def changed(motion, **options):

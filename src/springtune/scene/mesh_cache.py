@@ -1,4 +1,4 @@
-"""A meshed sheet and its networks: the recipe mesh, springs, network, problem, solve, judge."""
+"""What scenes of a mesh share, and the recipe of a scene: springs, network, problem, equilibrium, judged."""
 
 import hashlib
 import time
@@ -120,7 +120,7 @@ def solved(
     return Solution(problem, load, found, status, message, pivots, value)
 
 
-class Sheet:
+class MeshCache:
     """Cache of a meshed sheet of a thickness [m], on which scenes are solved.
 
     Networks that differ in their reference stiffness alone are assembled and factorized once, `networks` of them are
@@ -129,7 +129,7 @@ class Sheet:
     of load, `filled` the beams that the mesh is known to fill, `references` those of load cases of a shape.
     """
 
-    def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
+    def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "MeshCache | None" = None) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))

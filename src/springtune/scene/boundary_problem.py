@@ -1,6 +1,6 @@
-"""The problem of a scene: a beam under a force, or a shape under a load case.
+"""Boundary-value problems of scenes: a beam under a force, or a shape under a load case.
 
-A statement has supports and forces on a mesh, the quantities of interest, and the reference.
+Each has supports and forces on a mesh, quantities of interest, and the reference.
 """
 
 from abc import ABC, abstractmethod
@@ -32,9 +32,9 @@ from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
+from .mesh_cache import Loading, MeshCache, Solution, chosen, solved
 from .meshed import check_meshed
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
-from .sheet import Loading, Sheet, Solution, chosen, solved
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
@@ -47,7 +47,7 @@ A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
 """How a mesh with groups is made, for messages."""
 
 
-class Statement(ABC):
+class BoundaryProblem(ABC):
     """A body under a load: what is held and loaded, what is read, and the reference.
 
     `force` is the factor of `loading`: the force on a beam with its sign [N], 1 of a shape. `size` is the size of the
@@ -65,7 +65,7 @@ class Statement(ABC):
     case: LoadCase
     loading: Loading
     by_part: Mapping[str, AnyMaterial]
-    sheet: Sheet
+    sheet: MeshCache
 
     @property
     def mesh(self) -> Mesh:
@@ -184,7 +184,7 @@ class Statement(ABC):
         return np.where(self.loading.held, springs.reference * resistance - load, 0.0)
 
 
-class BeamStatement(Statement):
+class BeamProblem(BoundaryProblem):
     """A beam under a load: a shape with four named sides, under a force on one of them."""
 
     def __init__(
@@ -195,7 +195,7 @@ class BeamStatement(Statement):
         load: str | Load,
         force: float | str | None,
         kinematics: str,
-        sheet: Sheet | None = None,
+        sheet: MeshCache | None = None,
     ) -> None:
         is_a(beam, Beam, "beam", A_BEAM)
         is_a(mesh, Mesh, "mesh", A_MESH)
@@ -242,7 +242,7 @@ class BeamStatement(Statement):
         return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
 
 
-class ShapeStatement(Statement):
+class ShapeProblem(BoundaryProblem):
     """A shape under one of its load cases, times `scale` [1]."""
 
     scale: float
@@ -255,7 +255,7 @@ class ShapeStatement(Statement):
         load: str,
         scale: float,
         kinematics: str,
-        sheet: Sheet | None = None,
+        sheet: MeshCache | None = None,
     ) -> None:
         is_a(shape, Shape, "shape", A_SHAPE)
         if isinstance(grouped, Mesh):
@@ -358,11 +358,11 @@ class ShapeStatement(Statement):
         return "" if law == "st-venant" and not self.objection() else law
 
 
-def sheet_of(mesh: Mesh, thickness: float, sheet: Sheet | None) -> Sheet:
+def sheet_of(mesh: Mesh, thickness: float, sheet: MeshCache | None) -> MeshCache:
     """Return the sheet of another scene, if it is of this mesh and thickness, or a new one."""
     if sheet is None:
-        return Sheet(mesh, thickness)
-    is_a(sheet, Sheet, "sheet", "that of another scene")
+        return MeshCache(mesh, thickness)
+    is_a(sheet, MeshCache, "sheet", "that of another scene")
     if sheet.mesh is not mesh or sheet.thickness != thickness:
         raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
     return sheet
