@@ -71,5 +71,3 @@ def test_bonds_do_not_cross_what_is_no_body():
     assert (mesh.cells_per_edge == 0).sum() == len(mesh.bonds)
     with pytest.raises(MeshError, match="a mesh file has no place for"):
         write_mesh("bonds.vtu", mesh)
-    with pytest.raises(MeshError, match="bonds: they join points up to 28 of 28; renumber them"):
-        Mesh(points, mesh.triangles, mesh.quads, np.array([[0, 28]]))
