@@ -30,15 +30,24 @@ class Stored(NamedTuple):
 
 def variables(group: h5py.Group) -> dict[str, Stored]:
     """Variables of a group by name."""
+    # By address: HDF5 looks through the whole file for the name of what a reference is to.
+    arrays = {name: one for name, one in group.items() if isinstance(one, h5py.Dataset)}
+    above = {name: one for name, one in group.parent.items() if isinstance(one, h5py.Dataset)}
+    names = {_address(one.id): name for name, one in (above | arrays).items()}
     found = {}
-    for name, array in group.items():
-        if isinstance(array, h5py.Dataset) and not is_bare(array):
-            scales = [h5py.h5r.get_name(one[0], array.id) for one in array.attrs.get("DIMENSION_LIST", ())]
-            dims = [scale.decode().rpartition("/")[2] for scale in scales] or [name] * ("CLASS" in array.attrs)
+    for name, array in arrays.items():
+        if not is_bare(array):
+            scales = [one[0] for one in array.attrs.get("DIMENSION_LIST", ())]
+            dims = [names[_address(h5py.h5r.dereference(scale, array.id))] for scale in scales]
+            dims = dims or [name] * ("CLASS" in array.attrs)
             if array.shape is None or len(dims) != array.ndim:
                 raise ValueError(f"'{name}' has no shape, or has no dimension scale for each dimension")
             found[name] = Stored(tuple(dims), attributes_of(array), array)
     return found
+
+
+def _address(one: h5py.h5g.ObjectID) -> int:
+    return int(h5py.h5o.get_info(one).addr)
 
 
 def is_bare(array: h5py.Dataset) -> bool:
