@@ -21,7 +21,7 @@ from springtune.springs import DEFINITIONS
 from springtune.studies.kinds.samples import designs, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
-from springtune.studies.kinds.samples.kind import MOST_SOLVED
+from springtune.studies.kinds.samples.kind import MOST_SOLVED_ROWS
 from springtune.studies.runs import store
 from springtune.studies.runs.attempts import Attempts
 from springtune.studies.runs.plan import plan
@@ -367,7 +367,7 @@ class TestReferences:
     def test_those_of_a_large_one_are_holes_that_the_summary_tells_of(self, tmp_path, monkeypatch):
         """Of one network: all that varies is the force."""
         fixed = ((LENGTHS, "80 mm"), ("{from: 20 mm, to: 40 mm}", "40 mm"), (SIZES, "20 mm"), (RATIOS, "0.3"))
-        size = ("size: 16", f"size: {2 * MOST_SOLVED}\n  design: sobol")
+        size = ("size: 16", f"size: {2 * MOST_SOLVED_ROWS}\n  design: sobol")
         data, summary = self.collected(tmp_path, monkeypatch, *fixed, size)
         assert data.deformation_error.isnull().all() and (data.reference_applies == 0).all()
         assert "no interpolant; up to 1024 points they would be solved one by one" in data.reference_message.item()

@@ -6,7 +6,7 @@ from ...registry import how_to_install
 
 
 class PaperError(Exception):
-    """A fault of a paper's source or datasets."""
+    """An error in the source or the datasets of a paper."""
 
 
 def check_typst() -> None:

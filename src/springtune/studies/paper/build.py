@@ -21,7 +21,7 @@ from springtune.safe_io import atomic
 
 from ..output.text import cell_text
 from . import PaperError, check_typst, numbers
-from .numbers import HASH_SHOWN, Dataset, checked, chosen
+from .numbers import HASH_DIGITS, Dataset, dataset_of, validated
 
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
@@ -58,7 +58,7 @@ def main(source: str, folder: str, output: str, record: str, digest: str, *paths
 
 
 def typeset(source: Path, folder: Path) -> bytes:
-    """Typeset a paper whose numbers and figures are made."""
+    """Typeset a paper from its numbers and figures."""
     import typst
 
     source, folder = source.resolve(), folder.resolve()
@@ -74,6 +74,7 @@ def typeset(source: Path, folder: Path) -> bytes:
 
 
 def _check_texts(source: Path) -> None:
+    """Raise if numbers are typed into the text."""
     if not (source / MAIN).is_file():
         raise PaperError(f"{source / MAIN}: there is no such file; give the folder of a paper's source")
     found = [
@@ -87,7 +88,7 @@ def _check_texts(source: Path) -> None:
 
 
 def _labels(datasets: Mapping[str, Dataset]) -> list[str]:
-    """Labels of all dimensions."""
+    """Labels of beams, definitions, mesh types and materials."""
     found = {str(label) for one in datasets.values() for name in ("beam", "definition", "mesh_type", "material")
              if name in one.tree.coords for label in one.tree.coords[name].values}  # fmt: skip
     return sorted(found)
@@ -98,7 +99,7 @@ def _labels(datasets: Mapping[str, Dataset]) -> list[str]:
 FUNCTIONS = ("beam", "drawing", "has", "n", "named", "range", "tabular", "v")
 """Template functions whose arguments are names or layout."""
 
-_BLANKED = (
+IGNORED_PATTERNS = (
     re.compile(r"/\*.*?\*/", re.DOTALL),
     re.compile(r"(?<!:)//[^\n]*"),
     re.compile(r"^#(?:import|include|set|show)\b[^\n]*", re.MULTILINE),
@@ -108,17 +109,17 @@ _BLANKED = (
     re.compile(r"<[\w-]+>"),
     re.compile(r"https?://\S+"),
 )
-_REFERENCE = re.compile(
+REFERENCE_PATTERN = re.compile(
     r"\b(?:[Tt]ables?|[Ff]igures?|[Ee]quations?|[Ss]ections?)[\s~]+\d+(?:\.\d+)*(?:(?:,|[\s~]+to|[\s~]+and|–|-)[\s~]*\d+(?:\.\d+)*)*"
 )
-_NAME = re.compile(r"\b[23]-?D\b|(?<=[A-Za-z_])\d+\w*")
-_FORMULA = re.compile(r"\$[^$]*\$")
-_STRUCTURE = re.compile(r"(?<![\d.,])\d(?![\d.,]*\d)")
-_NUMBER = re.compile(r"\d[\d.,]*(?:\s*%|\s*[a-zA-Zµ°]+\b)?")
+NAME_PATTERN = re.compile(r"\b[23]-?D\b|(?<=[A-Za-z_])\d+\w*")
+FORMULA_PATTERN = re.compile(r"\$[^$]*\$")
+SINGLE_DIGIT_PATTERN = re.compile(r"(?<![\d.,])\d(?![\d.,]*\d)")
+NUMBER_PATTERN = re.compile(r"\d[\d.,]*(?:\s*%|\s*[a-zA-Zµ°]+\b)?")
 
 
 def _blank(found: re.Match[str]) -> str:
-    """Replace a match by empty lines."""
+    """Replace a match by spaces and line breaks."""
     return re.sub(r"[^\n]", " ", found.group())
 
 
@@ -137,12 +138,12 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
     >>> list(typed_numbers("As a formula: $k = 0.866 E t$."))
     [(1, '0.866 E')]
     """
-    for pattern in _BLANKED:
+    for pattern in IGNORED_PATTERNS:
         text = pattern.sub(_blank, text)
-    text = _FORMULA.sub(lambda formula: _STRUCTURE.sub(_blank, formula.group()), text)
-    for pattern in (_REFERENCE, _NAME):
+    text = FORMULA_PATTERN.sub(lambda formula: SINGLE_DIGIT_PATTERN.sub(_blank, formula.group()), text)
+    for pattern in (REFERENCE_PATTERN, NAME_PATTERN):
         text = pattern.sub(_blank, text)
-    for found in _NUMBER.finditer(text):
+    for found in NUMBER_PATTERN.finditer(text):
         yield text.count("\n", 0, found.start()) + 1, found.group().strip()
 
 
@@ -178,13 +179,14 @@ def draw(
     declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: Path, examples: Path = Path("examples")
 ) -> dict[str, Any]:
     """Draw the figures of a paper as PDF files."""
-    drawings = {name: checked(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
+    drawings = {name: validated(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
     for name, drawing in drawings.items():
         atomic.write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))
     return {name: _origin(drawing, datasets, f"figure {name}") for name, drawing in drawings.items()}
 
 
 def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples: Path) -> bytes:
+    """Draw a figure and return its PDF."""
     import matplotlib
     import matplotlib.pyplot as plt
 
@@ -192,7 +194,7 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
 
     def plotted(panel: Panel, part: "SubFigure | None") -> Any:
         try:
-            return _plot(panel.plot, name)(chosen(datasets, panel.study, name).tree, part, **panel.at)
+            return _plot_function(panel.plot, name)(dataset_of(datasets, panel.study, name).tree, part, **panel.at)
         except (KeyError, TypeError, ValueError) as error:
             raise PaperError(f"{name}: {panel.plot} of the study '{panel.study}': {error}") from None
 
@@ -201,7 +203,7 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
         if bool(drawing.example) == bool(drawing.panels):
             raise PaperError(f"{name}: give panels, or the example that draws it, one of both")
         if drawing.example:
-            figure = _drawn(examples / f"{drawing.example}.py", name)
+            figure = _example_figure(examples / f"{drawing.example}.py", name)
         elif drawing.size is None and len(drawing.panels) == 1:
             figure = np.ravel(plotted(drawing.panels[0], None))[0].figure
         elif drawing.size is None:
@@ -217,8 +219,8 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
     return content.getvalue()
 
 
-def _drawn(script: Path, name: str) -> Any:
-    """Figure that an example leaves open."""
+def _example_figure(script: Path, name: str) -> Any:
+    """Run an example and return its open figure."""
     import matplotlib.pyplot as plt
 
     if not script.is_file():
@@ -231,7 +233,8 @@ def _drawn(script: Path, name: str) -> Any:
     return plt.gcf()
 
 
-def _plot(plot: str, name: str) -> Callable[..., object]:
+def _plot_function(plot: str, name: str) -> Callable[..., object]:
+    """Return a public plot function by its name."""
     import springtune
 
     if not plot.startswith("plot_") or plot not in springtune.__all__:
@@ -241,13 +244,13 @@ def _plot(plot: str, name: str) -> Callable[..., object]:
 
 
 def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Panel selections by study with hashes of datasets, or the script."""
+    """Describe the source of a figure: selections and hashes of datasets, or the script."""
     if drawing.example:
         return f"none, drawn by examples/{drawing.example}.py"
     parts = []
     for panel in drawing.panels:
         place = ": ".join(filter(None, (panel.study, cell_text(panel.at, {"mesh_size": "m"}))))
-        parts.append(f"{place}, sha256 {chosen(datasets, panel.study, name).sha256[:HASH_SHOWN]}")
+        parts.append(f"{place}, sha256 {dataset_of(datasets, panel.study, name).sha256[:HASH_DIGITS]}")
     return "; ".join(dict.fromkeys(parts))
 
 

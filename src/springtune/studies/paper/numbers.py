@@ -31,7 +31,7 @@ from ..output.dataset import STATUS
 from ..runs import provenance
 from . import PaperError
 
-HASH_SHOWN = 12
+HASH_DIGITS = 12
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,17 @@ class Dataset:
         return str(self.tree.attrs["study"])
 
     def origin(self) -> dict[str, object]:
-        """Facts for a statement on reproducibility."""
+        """Versions, date and hash, for the statement on reproducibility."""
         attributes = self.tree.attrs
         return {
             "study": self.study,
             "title": attributes["title"],
             "version": attributes["springtune_version"],
-            "commit": attributes["git_commit"][:HASH_SHOWN] or "no commit",
+            "commit": attributes["git_commit"][:HASH_DIGITS] or "no commit",
             "changed": attributes["git_commit"].endswith(provenance.CHANGED),
             "created": attributes["created"][:10],
             "software": json.loads(attributes["software"]),
-            "sha256": self.sha256[:HASH_SHOWN],
+            "sha256": self.sha256[:HASH_DIGITS],
         }
 
 
@@ -75,8 +75,8 @@ def read(paths: Iterable[str | Path]) -> dict[str, Dataset]:
     return found
 
 
-def chosen(datasets: Mapping[str, Dataset], study: str, what: str) -> Dataset:
-    """Dataset of a study."""
+def dataset_of(datasets: Mapping[str, Dataset], study: str, what: str) -> Dataset:
+    """Return the dataset of a study."""
     if study not in datasets:
         raise PaperError(
             f"{what}: no dataset of the study '{study}' was given; there is {', '.join(datasets) or 'none'}: "
@@ -182,7 +182,7 @@ class Table(BaseModel):
 
 
 def load(path: Path) -> dict[str, Any]:
-    """Content of a YAML file."""
+    """Read a YAML file."""
     try:
         return yaml.safe_load(path.read_text(encoding="utf-8")) or {}
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -196,13 +196,13 @@ def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: M
         raise PaperError(f"{', '.join(twice)}: declared twice, in numbers.yaml and printed.yaml; rename one")
     found: dict[str, Any] = {}
     for name, entry in printed.items():
-        one = checked(Printed, entry, name)
+        one = validated(Printed, entry, name)
         value = float(one.printed) * TEXT_UNITS[one.unit][1]
         found[name] = {"text": one.printed.replace("-", "−"), "unit": one.unit, "value": value, "source": one.where}
     wrong = []
     for name, entry in declared.items():
         try:
-            found[name] = _read(checked(Number, entry, name), found, datasets, name)
+            found[name] = _evaluate(validated(Number, entry, name), found, datasets, name)
         except PaperError as error:  # told together with what else is wrong
             wrong.append(str(error))
             found[name] = {"text": None, "unit": "", "value": None, "source": ""}
@@ -211,12 +211,13 @@ def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: M
     return found
 
 
-def _read(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
+def _evaluate(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
+    """Evaluate a declared number."""
     if number.formula:
         value, why = _formula(number.formula, found, name), f"the formula '{number.formula}' has no value"
     else:
         cells = _cells(number, datasets, name)
-        value, said = _value(number, cells, name), next((f": {one}" for one in map(str, cells.message) if one), "")
+        value, said = _reduce(number, cells, name), next((f": {one}" for one in map(str, cells.message) if one), "")
         why = (
             f"{datasets[number.study].path} has no value of {number.source()}{said}; run config/{number.study}.yaml "
             "again with what it needs, or declare the number optional and give the text a branch without it"
@@ -230,25 +231,25 @@ def _read(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Datas
 
 def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
     """Evaluate a table: titles and formatted cells."""
-    made = checked(Table, declared, name)
-    columns = [checked(Number, entry, name) for entry in made.columns]
+    made = validated(Table, declared, name)
+    columns = [validated(Number, entry, name) for entry in made.columns]
     rows, studies = [], set()
     for entry in made.rows:
         texts = []
         for column in made.columns:
             at = {key: label for part in (made.all, entry, column) for key, label in part.get("at", {}).items()}
-            number = checked(Number, {**made.all, **entry, **column, "at": at}, name)
+            number = validated(Number, {**made.all, **entry, **column, "at": at}, name)
             studies.add(number.study)
             cells = _cells(number, datasets, name, of_table=True)
-            value = _value(number, cells, name)
+            value = _reduce(number, cells, name)
             texts.append(number.text(value) + _marks(number, cells) if math.isfinite(value) else "–")
-        rows.append(_head(checked(Number, entry, name)) | {"cells": texts})
-    data = "; ".join(f"{study}, sha256 {datasets[study].sha256[:HASH_SHOWN]}" for study in sorted(studies))
-    return {"columns": [_head(one) for one in columns], "rows": rows, "data": data}
+        rows.append(_heading(validated(Number, entry, name)) | {"cells": texts})
+    data = "; ".join(f"{study}, sha256 {datasets[study].sha256[:HASH_DIGITS]}" for study in sorted(studies))
+    return {"columns": [_heading(one) for one in columns], "rows": rows, "data": data}
 
 
-def _head(number: Number) -> dict[str, str]:
-    """Title and group with labels filled in, mesh sizes in mm."""
+def _heading(number: Number) -> dict[str, str]:
+    """Title and group of a row or column, with labels filled in."""
     labels = {name: f"{1e3 * one:g} mm" if name == "mesh_size" else str(one) for name, one in number.at[0].items()}
     filled = {"title": number.title, "group": number.group}
     for name, label in labels.items():
@@ -256,8 +257,8 @@ def _head(number: Number) -> dict[str, str]:
     return filled | {"unit": number.unit}
 
 
-def checked(model: type[Any], entry: object, name: str) -> Any:
-    """Validate a declaration."""
+def validated(model: type[Any], entry: object, name: str) -> Any:
+    """Validate a declaration by its model."""
     try:
         return model.model_validate(entry)
     except ValidationError as error:
@@ -272,7 +273,7 @@ def _cells(number: Number, datasets: Mapping[str, Dataset], name: str, of_table:
     """
     if not number.study or not number.variable:
         raise PaperError(f"{name}: give a study and a variable, or a formula")
-    one = chosen(datasets, number.study, name)
+    one = dataset_of(datasets, number.study, name)
     group, _, variable = number.variable.rpartition("/")
     if group and group not in one.tree.children:
         raise PaperError(f"{name}: {one.path} has no group /{group}; give one that it has, or run the study again")
@@ -314,7 +315,7 @@ def _cells(number: Number, datasets: Mapping[str, Dataset], name: str, of_table:
 
 
 def _selected(data: xr.Dataset, variable: str, dimension: str, label: Any, optional: bool, name: str) -> xr.Dataset:
-    """Cells at a label, or several; none if an optional number lacks it."""
+    """Select the cells at one or several labels; none if an optional number lacks a label."""
     array = data["value"]
     if dimension not in array.dims:
         known = ", ".join(str(one) for one in array.dims if one != "place")
@@ -328,8 +329,8 @@ def _selected(data: xr.Dataset, variable: str, dimension: str, label: Any, optio
     raise PaperError(f"{name}: {dimension} {lacking[0]!r} is not in the dataset; it has {', '.join(map(repr, labels))}")
 
 
-def _value(number: Number, cells: pd.DataFrame, name: str) -> float:
-    """Value of the cells, NaN without any."""
+def _reduce(number: Number, cells: pd.DataFrame, name: str) -> float:
+    """Reduce cells to one value; NaN without any."""
     values = cells.value[np.isfinite(cells.value)].to_numpy()
     if number.cells is not None and len(values) != number.cells:
         raise PaperError(
@@ -348,7 +349,7 @@ def _value(number: Number, cells: pd.DataFrame, name: str) -> float:
 
 
 def _marks(number: Number, cells: pd.DataFrame) -> str:
-    """Marks of a cell whose status is not solved, or that has a text."""
+    """Marks of a table cell that is not solved, or that has a text."""
     solved = STATUS.index("solved")
     marked = {
         name: (cells[name] != solved).any() if name == "status" else any(map(str, cells[name])) for name in number.marks
@@ -373,7 +374,7 @@ def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
         ) from None
 
 
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _significant(value: float, figures: int) -> str:
@@ -382,4 +383,4 @@ def _significant(value: float, figures: int) -> str:
     exponent = int(power)
     if -4 <= exponent < 5:
         return f"{float(f'{mantissa}e{power}'):.{max(figures - 1 - exponent, 0)}f}"
-    return f"{mantissa} × 10{str(exponent).translate(_RAISED)}"
+    return f"{mantissa} × 10{str(exponent).translate(SUPERSCRIPTS)}"

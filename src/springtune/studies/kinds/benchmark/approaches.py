@@ -21,11 +21,11 @@ from springtune.scene.mesh_cache import MeshCache
 
 
 def network(scene, size, clock, definition, mesh_type):
-    """A definition, linear; definitions share meshes, whose time counts for each of them."""
-    mesh, seconds = _made(mesh_type, scene.beam, size)
+    """Solve the linear network of a definition; definitions share a mesh, whose time counts for each."""
+    mesh, seconds = _timed_mesh(mesh_type, scene.beam, size)
     clock.seconds["meshing"] += seconds
     with clock("assembling"):
-        sheet, springs, problem = _problem(scene, mesh, definition)
+        cache, springs, problem = _problem(scene, mesh, definition)
         problem.network.tangent()
     with clock("factorizing"):
         problem.network.rest_factor  # noqa: B018  factorized when first asked for
@@ -33,11 +33,12 @@ def network(scene, size, clock, definition, mesh_type):
         found = problem.linear(scene.force / springs.reference)
     if not found.converged:
         raise ArithmeticError(found.reason)
-    return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
+    return cache.displacement(scene.kind, found.displacements), problem.network.unknowns
 
 
 @lru_cache(maxsize=len(MESH_TYPES))
-def _made(mesh_type, beam, size):
+def _timed_mesh(mesh_type, beam, size):
+    """Return the mesh of a beam and the seconds to make it."""
     MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
     begin = time.perf_counter()
     mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
@@ -46,28 +47,29 @@ def _made(mesh_type, beam, size):
 
 
 def _problem(scene, mesh, definition):
-    """Mesh cache, springs and static problem; forces that a definition adds to a load are left out."""
-    sheet = MeshCache(mesh, scene.beam.thickness)
-    springs = replace(sheet.derive(definition, scene.material)[0], lateral=0.0)
-    sheet.measured(scene.kind)
-    return sheet, springs, sheet.problem(scene.kind, springs)
+    """Return mesh cache, springs and static problem, without the forces that a definition adds to a load."""
+    cache = MeshCache(mesh, scene.beam.thickness)
+    springs = replace(cache.derive(definition, scene.material)[0], lateral=0.0)
+    cache.measured(scene.kind)
+    return cache, springs, cache.problem(scene.kind, springs)
 
 
 def _mesh(scene, size, clock):
+    """Make a mesh of equilateral rows."""
     with clock("meshing"):
         mesh = structured(scene.beam.length, scene.beam.height, size)
         mesh.edges  # noqa: B018  computed when first asked for
     return mesh
 
 
-def _middle(scene, places, moved):
-    """Displacement of the middle of the loaded side, of particles at places along it [m]."""
+def _middle_displacement(scene, places, moved):
+    """Interpolate the displacement of the middle of the loaded side from particles at places along it [m]."""
     order = np.argsort(places)
     return float(np.interp(scene.kind.side_length(scene.beam) / 2, places[order], moved[order]))
 
 
 def triangles(scene, size, clock, degree):
-    """Triangles of scikit-fem on equilateral rows."""
+    """Solve by triangles of scikit-fem on equilateral rows."""
     from skfem import Basis, ElementTriP1, ElementTriP2, ElementVector, FacetBasis, LinearForm, MeshTri
     from skfem.models.elasticity import linear_elasticity
 
@@ -77,7 +79,7 @@ def triangles(scene, size, clock, degree):
     with clock("assembling"):
         element = ElementVector((ElementTriP1, ElementTriP2)[degree - 1]())
         basis = Basis(mesh, element)
-        young, nu = scene.sheet.young_modulus, scene.sheet.poisson_ratio
+        young, nu = scene.in_plane.young_modulus, scene.in_plane.poisson_ratio
         lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))  # in the plane
         matrix = linear_elasticity(lam, mu).assemble(basis) * scene.beam.thickness
         value, along, axis = scene.side
@@ -106,7 +108,7 @@ def tensor_mass(scene, size, clock):
     """
     mesh = _mesh(scene, size, clock)
     with clock("assembling"):
-        young, nu = scene.sheet.young_modulus, scene.sheet.poisson_ratio
+        young, nu = scene.in_plane.young_modulus, scene.in_plane.poisson_ratio
         lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))
         corners = mesh.points[mesh.triangles]
         opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
@@ -116,6 +118,7 @@ def tensor_mass(scene, size, clock):
         volume = 0.5 * np.abs(double) * scene.beam.thickness
 
         def tensor(i, j):
+            """Return the stiffness tensor between two corners of each triangle."""
             a, b = slopes[:, i], slopes[:, j]
             outer = a[:, :, None] * b[:, None, :]
             inner = np.einsum("ni,ni->n", a, b)[:, None, None] * np.eye(2)
@@ -135,6 +138,7 @@ def tensor_mass(scene, size, clock):
         diagonal = np.einsum("nii->ni", of_particles)
 
     def forces(flat):
+        """Return the forces of flat displacements."""
         u = flat.reshape(load.shape)
         total = np.einsum("nij,nj->ni", of_particles, u)
         to_first = np.einsum("nij,nj->ni", of_edges, u[second])
@@ -154,16 +158,16 @@ def tensor_mass(scene, size, clock):
 
 
 def condensation(scene, size, clock):
-    """Responses of the loaded side to unit loads, computed once (``factorizing``); a load then costs a product."""
+    """Solve for unit loads on the loaded side once (``factorizing``); a load then costs one product."""
     mesh = _mesh(scene, size, clock)
     with clock("assembling"):
-        sheet, springs, problem = _problem(scene, mesh, "delingette")
+        cache, springs, problem = _problem(scene, mesh, "delingette")
         problem.network.tangent()
     with clock("factorizing"):
         net, factor = problem.network, problem.network.rest_factor
         loaded = np.flatnonzero(problem.load)
         responses = np.zeros((len(loaded), len(loaded)))
-        watched = net.reduce(sheet.measured(scene.kind))
+        watched = net.reduce(cache.measured(scene.kind))
         unit = np.zeros(net.unknowns)
         of_watched = np.zeros(len(loaded))
         for number, place in enumerate(loaded):
@@ -197,8 +201,8 @@ def boundary_elements(scene, size, clock):
         middle = 0.5 * (start + end)
         side = np.repeat(np.arange(4), [columns, rows, columns, rows])  # lower, right, upper, left
     with clock("assembling"):
-        nu = scene.sheet.poisson_ratio / (1 + scene.sheet.poisson_ratio)
-        shear = scene.sheet.young_modulus / (2 * (1 + scene.sheet.poisson_ratio))
+        nu = scene.in_plane.poisson_ratio / (1 + scene.in_plane.poisson_ratio)
+        shear = scene.in_plane.young_modulus / (2 * (1 + scene.in_plane.poisson_ratio))
         count = len(middle)
         u, t = np.zeros((2, count, 2, count, 2))
         places, shares = np.polynomial.legendre.leggauss(8)
@@ -234,7 +238,7 @@ def boundary_elements(scene, size, clock):
     with clock("solving"):
         moved = np.where(clamped, 0.0, solution).reshape(-1, 2)[:, axis]
         if scene.kind.pressed:
-            displacement = _middle(scene, middle[loaded, scene.kind.along], moved[loaded])
+            displacement = _middle_displacement(scene, middle[loaded, scene.kind.along], moved[loaded])
         else:
             displacement = float(moved[loaded] @ lengths[loaded] / lengths[loaded].sum())
     return displacement, 2 * count
@@ -245,7 +249,7 @@ def free_form(scene, size, clock):
 
     T. W. Sederberg, S. R. Parry, Computer Graphics 20(4):151, 1986.
     """
-    beam, young = scene.beam, scene.sheet.young_modulus
+    beam, young = scene.beam, scene.in_plane.young_modulus
     mesh = _mesh(scene, size, clock)
     with clock("solving"):
         across, axis = scene.kind.normal, scene.kind.axis
@@ -263,7 +267,7 @@ def free_form(scene, size, clock):
 
 
 def calculix_cps3(scene, size, clock):
-    """CalculiX with linear triangles, the same as ours."""
+    """Solve by CalculiX with linear triangles on the same mesh."""
     mesh = _mesh(scene, size, clock)
     load = scene.force * weights(mesh, scene.kind)
     with clock("solving"):
@@ -274,7 +278,7 @@ def calculix_cps3(scene, size, clock):
 
 
 def calculix_cps8(scene, size, clock):
-    """CalculiX with quadratic serendipity quadrilaterals."""
+    """Solve by CalculiX with quadratic serendipity quadrilaterals."""
     value, along, axis = scene.side
     with clock("meshing"):
         points, elements = calculix.quadratic_mesh(scene.beam.length, scene.beam.height, size)
@@ -288,7 +292,7 @@ def calculix_cps8(scene, size, clock):
     moved = found[:, axis]
     if scene.kind.pressed:
         loaded = np.flatnonzero(shares)
-        return _middle(scene, points[loaded, scene.kind.along], moved[loaded]), int((~clamp).sum())
+        return _middle_displacement(scene, points[loaded, scene.kind.along], moved[loaded]), int((~clamp).sum())
     return float(moved @ shares), int((~clamp).sum())
 
 

@@ -8,25 +8,26 @@ from springtune.problem.status import Status
 from ...output import labels, style
 from ...output.selection import choose, group
 
-SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
-         "boundary-elements", "tensor-mass", "calculix-cps3", "calculix-cps8")  # fmt: skip
+FIRST_NAMED = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles",
+               "quadratic-triangles", "boundary-elements", "tensor-mass", "calculix-cps3",
+               "calculix-cps8")  # fmt: skip
 """Approaches with names before others, which are grey."""
 
-RING = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
+RING_STYLE = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
 
 
-def named(data):
-    """Approaches to name: those with an error in `SHOWN`, then as many others as fit, the most accurate first."""
+def named_approaches(data):
+    """Choose approaches to name: those of `FIRST_NAMED` with an error, then the most accurate others that fit."""
     dimensions = [name for name in data.error.dims if name != "approach"]
     smallest = np.abs(data.error).min(dimensions)
     order = np.argsort(smallest.values)
     there = data.approach.values[order[np.isfinite(smallest.values[order])]].tolist()
-    chosen = [name for name in SHOWN if name in there]
-    return chosen + [name for name in there if name not in chosen][: len(SHOWN) - len(chosen)]
+    chosen = [name for name in FIRST_NAMED if name in there]
+    return chosen + [name for name in there if name not in chosen][: len(FIRST_NAMED) - len(chosen)]
 
 
 def benchmark(tree):
-    """Figures of the benchmark: errors over seconds of each scene."""
+    """Yield the figure of each scene: stem, plot function and selection."""
     for scene in group(tree, "benchmark").scene.values.tolist():
         yield f"benchmark_{scene}", plot_benchmark, {"scene": scene}
 
@@ -67,9 +68,9 @@ def plot_benchmark(data, ax=None, *, scene=None):
     case = _scene(data, scene)
     rings = unbeaten(case.assured_error.values, case.seconds.values)
     ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
-    lost = "; ".join(filter(None, (ringed, _lost(case) and f"not drawn: {_lost(case)}")))
+    lost = "; ".join(filter(None, (ringed, _missing_cases(case) and f"not drawn: {_missing_cases(case)}")))
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 4.0))
-    shown = named(case)
+    shown = named_approaches(case)
     for ring, approach in zip(rings, map(str, case.approach.values)):
         here = case.sel(approach=approach)
         errors, seconds = 100 * np.abs(here.error.values), here.seconds.values
@@ -78,10 +79,10 @@ def plot_benchmark(data, ax=None, *, scene=None):
         if approach in shown:
             look = style.line(shown.index(approach)) | {"label": approach}
         panel.plot(seconds[good], errors[good], **look)
-        panel.plot(seconds[ring], errors[ring], "o", **RING)
+        panel.plot(seconds[ring], errors[ring], "o", **RING_STYLE)
     panel.set(xlabel="Seconds, from nothing to the displacement", ylabel="|Error| [%]", title=case.scene.item())
     if not shown:
-        labels.say(panel, f"No approach has an error and a time: {_lost(case) or 'none was asked for'}.")
+        labels.say(panel, f"No approach has an error and a time: {_missing_cases(case) or 'none was asked for'}.")
         return panel
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
@@ -93,11 +94,12 @@ def plot_benchmark(data, ax=None, *, scene=None):
 
 
 def _scene(data, scene):
+    """Select a scene of the group ``/benchmark``."""
     data = group(data, "benchmark")
     return data.sel(choose(data.scene.notnull(), scene=scene))
 
 
-def _lost(case):
-    """How many cases have no numbers and why, in words; empty where all have."""
+def _missing_cases(case):
+    """Count the cases without numbers by status, in words; empty if all have them."""
     counts = labels.statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)

@@ -74,7 +74,7 @@ class BenchmarkConfig(Section):
 
 
 def in_benchmark(load: str) -> bool:
-    """Whether all approaches of the benchmark can hold and pull a beam like that."""
+    """Return whether every approach of the benchmark supports a load."""
     kind = LOADS[load].kind
     return kind.clamped and kind.loaded.far and not LOADS[load].follower
 
@@ -101,7 +101,7 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
-    """Values of each scene by its name; explicit steps are timed on the first one."""
+    """Values of each scene by name; explicit steps are timed on the first scene."""
     section = config.benchmark
     mesh_types = [name for name in MESH_TYPES if name in section.mesh_type]
     definitions = [name for name in DEFINITIONS if name in section.definition]
@@ -130,11 +130,11 @@ def _axes(scenes):
 
 def _tasks(study):
     for name, values in study.parts["benchmark"].items():
-        yield Task(values, _code(values["approaches"]), {"scene": name}, name=name)
+        yield Task(values, _code_keys(values["approaches"]), {"scene": name}, name=name)
 
 
-def _code(approaches):
-    """Keys of what a scene is measured with."""
+def _code_keys(approaches):
+    """Keys of the code that measures a scene."""
     pairs = [approach.split("/") for approach in approaches if "/" in approach]
     # What the approaches do not name is solved and timed on these.
     definitions = {"delingette", "lattice", *(definition for definition, _ in pairs)}

@@ -33,10 +33,10 @@ from .approaches import APPROACHES, network
 
 REPETITIONS = 3
 
-LONG = 0.4
+LONG_CASE_SECONDS = 0.4
 """Cases above these seconds run once."""
 
-UPDATES = 4_000_000
+EXPLICIT_UPDATES = 4_000_000
 """Springs that an explicit run advances, each step counted anew,"""
 
 FEWEST_STEPS = 50
@@ -44,19 +44,19 @@ FEWEST_STEPS = 50
 
 
 def failed(task, why):
-    """Result of a scene of which nothing is measured."""
-    return {"rows": [labels | _failed(why) for labels in cases(**task)]}
+    """Rows of a scene of which nothing could be measured."""
+    return {"rows": [labels | _failed_case(why) for labels in cases(**task)]}
 
 
 def solve(task):
-    """Errors and seconds of a scene."""
+    """Measure errors and seconds of a scene."""
     scene = LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
     rows = measure(scene, list(cases(**task)), task["most_seconds"])
     return {"rows": [*rows, *(explicit(scene, task["mesh_sizes"]) if task["explicit"] else ())]}
 
 
 def cases(approaches, mesh_sizes, finest, **_):
-    """Labels of the cases of a scene, from coarse to fine; an approach goes down to its ``finest`` size [m]."""
+    """Yield the labels of the cases of a scene, from coarse to fine, down to the ``finest`` size of an approach [m]."""
     for size in sorted(mesh_sizes, reverse=True):
         for approach, least in zip(approaches, finest):
             if size >= least:
@@ -78,7 +78,7 @@ class LoadedBeam:
         return LOADS[self.load].kind
 
     @property
-    def sheet(self):
+    def in_plane(self):
         """Material with the constants that the beam has in its plane."""
         return self.material.in_plane
 
@@ -101,7 +101,7 @@ class Clock:
 
     @contextmanager
     def __call__(self, part):
-        """Context whose seconds are a part's."""
+        """Add the seconds of this context to a part."""
         begin = time.perf_counter()
         yield
         self.seconds[part] += time.perf_counter() - begin
@@ -118,7 +118,7 @@ def measure(scene, cases, most_seconds):
     for case in cases:
         approach, size = case["approach"], case["mesh_size"]
         begin = time.perf_counter()
-        found = _failed(beyond[approach]) if approach in beyond else _case(scene, approach, size)
+        found = _failed_case(beyond[approach]) if approach in beyond else _measure_case(scene, approach, size)
         if time.perf_counter() - begin > most_seconds:
             limit = f"it took longer than the {most_seconds:g} s of `most_seconds`"
             beyond[approach] = f"not run: at {1e3 * size:g} mm {limit}"
@@ -136,44 +136,45 @@ def measure(scene, cases, most_seconds):
     return [about, *chain.from_iterable(rows.values())]
 
 
-def _failed(message, status=Status.FAILED):
+def _failed_case(message, status=Status.FAILED):
+    """Result of a case without numbers."""
     return {"status": int(status), "message": message}
 
 
-def _case(scene, approach, size):
-    """Result of a case, run again and again; the first run is cold, which a long one does not feel."""
+def _measure_case(scene, approach, size):
+    """Run a case several times and return its median seconds; the first, cold run of a short case does not count."""
     if approach.startswith("calculix") and not calculix.program():
-        return _failed("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
+        return _failed_case("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
     definition, _, mesh_type = approach.partition("/")
     run, clocks = partial(network, definition=definition, mesh_type=mesh_type), []
     run = run if mesh_type else APPROACHES[approach]
     try:
-        while len(clocks) <= REPETITIONS and not (clocks and clocks[0].total > LONG):
+        while len(clocks) <= REPETITIONS and not (clocks and clocks[0].total > LONG_CASE_SECONDS):
             clocks.append(Clock())
             displacement, unknowns = run(scene, size, clocks[-1])
     except DefinitionError as error:
-        return _failed(str(error))
+        return _failed_case(str(error))
     except MemoryError:
-        return _failed("not enough memory: the machine has no more")
+        return _failed_case("not enough memory: the machine has no more")
     except Exception as error:  # the other cases shall still be measured
         why = own_reason(error)
         if not why:
             raise
         traceback.print_exc()
-        return _failed(why, Status.NOT_CONVERGED)
+        return _failed_case(why, Status.NOT_CONVERGED)
     warm = clocks[1:] or clocks
     found = {"displacement": displacement, "unknowns": unknowns, "status": int(Status.SOLVED), "message": ""}
     found |= {f"{part}_seconds": np.median([clock.seconds[part] for clock in warm]) for part in PARTS}
     return found | {"seconds": np.median([clock.total for clock in warm])}
 
 
-def explicit(scene, sizes, updates=UPDATES):
-    """Rows of the nonlinear springs a second that explicit steps advance."""
+def explicit(scene, sizes, updates=EXPLICIT_UPDATES):
+    """Yield how many nonlinear springs explicit steps advance in a second."""
     for size in sizes:
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
-        sheet = MeshCache(mesh, scene.beam.thickness)
-        springs, _ = sheet.derive("lattice", scene.material)
-        motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force)
+        cache = MeshCache(mesh, scene.beam.thickness)
+        springs, _ = cache.derive("lattice", scene.material)
+        motion = motion_of(cache, scene.kind, springs, scene.material.density, scene.force)
         step = 0.9 * motion.step_bound("central-difference")
         steps = max(FEWEST_STEPS, round(updates / len(mesh.edges)))
         for threads, precision in product(THREAD_COUNTS, PRECISIONS):

@@ -11,7 +11,7 @@ from . import RUN_ENDS, SETTING
 from .kind import STAGE
 
 NETWORK, FACTOR = ("scene", "definition"), "stiffness_factor"
-OF_A_RUN = (*NETWORK, "engine", *SETTING)
+RUN = (*NETWORK, "engine", *SETTING)
 
 RUN_COORDINATES = {
     "scene_beam": (("scene",), "1", "beam", ""),
@@ -26,7 +26,7 @@ RUN_COORDINATES = {
 
 
 def _variables(cell):
-    """Variables of runs, of their networks and engines."""
+    """Variables of runs, networks and engines."""
     return {
         "displacement": (cell, "m", "displacement at rest", nan),
         "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
@@ -60,19 +60,19 @@ ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
 }
 """Own dimensions."""
 
-BEST = {
-    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", nan),
-    "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
+BEST_VARIABLES = {
+    "best_factor": (RUN, "1", "factor at which the displacement is the reference's", nan),
+    "best_factor_message": (RUN, "1", "why no factor is the best", ""),
 }
 
 FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
 
-ENGINE_RUNS = Group("/engines", _variables(OF_A_RUN), ENGINE_DIMENSIONS, FLAGS)
-ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, FACTOR)) | BEST, ENGINE_DIMENSIONS, FLAGS)
+ENGINE_RUNS = Group("/engines", _variables(RUN), ENGINE_DIMENSIONS, FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _variables((*RUN, FACTOR)) | BEST_VARIABLES, ENGINE_DIMENSIONS, FLAGS)
 
 
 def groups(study, folder):
-    """Groups of a dataset, see `springtune.studies.kinds.bodies.collect.groups`."""
+    """Build the groups of a dataset."""
     runs = zip(study.parts["engines"], results(STAGE, study, folder), strict=True)
     made, found = {}, [(run.of_curve, run.labels | result) for run, (_, result) in runs]
     for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
@@ -80,16 +80,16 @@ def groups(study, folder):
         axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}
         curves = defaultdict(list)
         for row in rows if wanted else ():
-            curves[tuple(row[name] for name in OF_A_RUN)].append((row[FACTOR], row))
-        rows += [dict(zip(OF_A_RUN, setting)) | _best(points) for setting, points in curves.items()]
+            curves[tuple(row[name] for name in RUN)].append((row[FACTOR], row))
+        rows += [dict(zip(RUN, setting)) | _best_factor(points) for setting, points in curves.items()]
         if rows:
             shared = {name: study.axes[name] for name in study.axes.keys() - ENGINE_DIMENSIONS.keys()}
             made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES])
     return made
 
 
-def _best(points):
-    """Factor at which the displacement is the reference's: between two, displacements are linear in 1 / factor."""
+def _best_factor(points):
+    """Factor at which the displacement equals the reference's, interpolated linearly in 1 / factor."""
     known = sorted((factor, result["error"]) for factor, result in points if np.isfinite(result.get("error", np.nan)))
     found = []
     for (below, high), (above, low) in zip(known, known[1:]):

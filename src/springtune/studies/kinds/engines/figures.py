@@ -9,12 +9,12 @@ from ...output.selection import choose, group, labels_of
 from ...output.text import cell_text
 from . import RUN_ENDS, SETTING
 
-FRAME = 1 / 60
+FRAME_SECONDS = 1 / 60
 """Time of motion that costs are given for [s]."""
 
 
 def engines(tree):
-    """Stem, function that plots, and selection of each figure."""
+    """Yield the figures of a dataset: stem, plot function and selection."""
     for name, stem, plot in (
         ("engines", "errors", plot_engine_errors),
         ("engine_curves", "curves", plot_engine_curves),
@@ -24,7 +24,7 @@ def engines(tree):
 
 
 def _runs(data, name, scene):
-    """Scene of a group, the rows of its runs by engine, with the definition where there are several, and what lacks."""
+    """Return a scene of a group, its runs by engine (and definition, if several), and the missing runs in words."""
     data = group(data, name)
     case = data.sel(choose(data.status != 0, scene=scene))
     runs = case[["status", "engine_status", "error", "frame_seconds"]].reset_coords(drop=True).to_dataframe()
@@ -73,7 +73,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     there = False
     for number, (name, rows) in enumerate(runs.items()):
         errors = 100 * rows.error.abs().where(rows.error != 0).values
-        times = 1e3 * FRAME * (rows.frame_seconds / rows.dt).values
+        times = 1e3 * FRAME_SECONDS * (rows.frame_seconds / rows.dt).values
         look = style.line(number)
         panel.plot(times, errors, **look | {"linestyle": "", "markersize": 2, "alpha": 0.5}, label="_")
         best = np.flatnonzero(unbeaten(errors, times))
@@ -91,8 +91,8 @@ def plot_engine_errors(data, ax=None, *, scene=None):
         said.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
         panel.set(**style.LOGARITHMIC)
         low, high = panel.get_xlim()
-        if low < 1e3 * FRAME < high:
-            panel.axvline(1e3 * FRAME, color="0.7", linewidth=0.9, zorder=0)
+        if low < 1e3 * FRAME_SECONDS < high:
+            panel.axvline(1e3 * FRAME_SECONDS, color="0.7", linewidth=0.9, zorder=0)
             said.insert(1, "right of the grey line: slower than real time")
         style.plain(panel, "x", "y")
     labels.finish(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
@@ -134,6 +134,7 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     shown = {name: rows for name, rows in runs.items() if rows.error.notna().any()}
 
     def draw(panel, rows):
+        """Draw the curves of an engine."""
         panel.set(xlabel="Factor on what is typed", ylabel="Displacement / reference")
         if not len(rows):
             return [], f"No run of a curve is at rest beside a reference: {lost}."

@@ -23,7 +23,7 @@ from .outputs import OUTPUTS
 MOST_ENGINE_RUNS = 10_000
 """Most combinations of one set of runs; each takes a tenth of a second and more."""
 
-OF_RUNS = ("definition", "engine", *SETTING, "stiffness_factor")
+RUN_KEYS = ("definition", "engine", *SETTING, "stiffness_factor")
 """What a set of runs lists values of, besides scenes."""
 
 OWN_PRECISION = "own"
@@ -118,6 +118,7 @@ class EngineRun:
 
 def _engines():
     # By name, since no dataset of other studies is to depend on the modules of engines.
+    """Engines by name, imported late: datasets of other studies must not depend on their modules."""
     return imported("engines.base:ENGINES")
 
 
@@ -142,8 +143,8 @@ def _check(config, problems):
             if one in section.scenes:
                 scene = section.scenes[one]
                 checks.check_able(problems, (*place, "definition"), runs.definition, [scene.mesh_type], [scene.load])
-        checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
-    lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS}
+        checks.check_product(problems, runs, place, RUN_KEYS, MOST_ENGINE_RUNS)
+    lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in RUN_KEYS}
     lists["scene"] = {*section.scenes}
     checks.check_count(problems, ("engines", "runs"), lists, checks.MOST_CELLS, "cells of all labels together")
 
@@ -158,7 +159,7 @@ def _expand(config, declared):
             stated, engine, of_curve = section.scenes[of[0]], engines[of[-1]], runs.stiffness_factor != [1.0]
             precision = engine.precisions[0] if precision == OWN_PRECISION else precision
             how = precision, dt, substeps, iterations if engine.iterates else 1, factor
-            labels = dict(zip(("scene", *OF_RUNS), (*of, *how)))
+            labels = dict(zip(("scene", *RUN_KEYS), (*of, *how)))
             material = material_key(declared.materials[stated.material], density=True)
             values = labels | dict(stated) | {"beam": beam_key(declared.beams[stated.beam]), "material": material}
             values |= {"frames": section.frames, "tolerance": section.tolerance}
@@ -176,13 +177,13 @@ def _summary(runs):
 
 
 def _version(engine):
-    """Versions of what an engine needs, "none" of what is absent: a new one runs it again."""
+    """Versions of the packages that an engine needs, or "none"; a new version runs the engine again."""
     names = (distribution(need.partition(">=")[0]) for need in engine.needs)
     return ", ".join(f"{name} {installed(name)}" for name in names)
 
 
 def _tasks(study):
-    """Runs of an engine follow each other in one job, since their seconds are measured."""
+    """Tasks of all runs; those of one engine share a job, because their seconds are measured."""
     for run in study.parts["engines"]:
         engine = _engines()[run.labels["engine"]]
         values = {name: value for name, value in run.values.items() if name != "scene"}

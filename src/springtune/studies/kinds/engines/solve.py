@@ -16,12 +16,12 @@ from . import RUN_ENDS, SETTING
 
 
 def failed(task, why, end="failed"):
-    """Result of a run that did not begin, or did not end by itself."""
+    """Result of a run that did not start, or that failed."""
     return {"status": Status.FAILED, "engine_status": RUN_ENDS.index(end), "message": why}
 
 
 def solve(task):
-    """Result of a run; what an engine refuses, or fails in, is a hole with a reason."""
+    """Run a scene in an engine; a refusal or a failure becomes a status with a message."""
     of = (task[name] for name in ("mesh_type", "mesh_size", "load", "force", "definition"))
     scene, known, objection = _scene(Beam(**task["beam"]), material_of(task["material"]), *of)
     engine, how = ENGINES[task["engine"]], {name: task[name] for name in (*SETTING, "frames", "tolerance")}
@@ -55,7 +55,7 @@ def solve(task):
 
 @lru_cache(maxsize=8)
 def _scene(beam, material, mesh_type, mesh_size, load, force, definition):
-    """Scene, its network's and its reference's displacement [m], and why the two are not to be compared."""
+    """Return a scene, its network and reference displacements [m], and why they cannot be compared."""
     mesh = make_mesh(beam, mesh_type, mesh_size)
     scene = Scene(beam, mesh, material, load, force, definition=definition)
     solved = scene.solve()

@@ -9,7 +9,7 @@ from ...output.selection import cells, choose, group, labels_of
 
 
 def laying(tree):
-    """The figure of laid strips."""
+    """Yield the figure of laid strips."""
     yield "laying", plot_laying, {}
 
 
@@ -57,15 +57,15 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
     size = (style.PAGE, (1.05 + 0.16 * max(len(names), 4)) * len(shown))
     _, axes = style.panels(ax, len(shown), 3, figsize=size, width_ratios=[1.9, 1.0, 1.0])
     for row, cell in zip(axes, shown):
-        _row(row, laid.sel(cell), cell, names)
+        _draw_row(row, laid.sel(cell), cell, names)
     return axes
 
 
-def _row(row, laid, cell, names):
+def _draw_row(row, laid, cell, names):
     """Draw the panels of one loading and friction."""
     shape, area, elongation = row
     friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
-    first = _shape(shape, laid, names)
+    first = _draw_shape(shape, laid, names)
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
     shape.set(aspect="equal", adjustable="datalim")
     labels.note(shape, [first])
@@ -79,7 +79,7 @@ def _row(row, laid, cell, names):
         labels.note(elongation, [f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")])
     area.axvline(0, color="0.45", linewidth=1.5)
     for panel, name in ((area, "area_error"), (elongation, "elongation")):
-        _dots(panel, laid, names, name)
+        _draw_dots(panel, laid, names, name)
     area.set(xlabel="Error [%]", title="Area below the strip")
     elongation.set(xlabel="Elongation [%]", title="Lower fibre")
     elongation.tick_params(labelleft=False)
@@ -87,17 +87,17 @@ def _row(row, laid, cell, names):
         labels.note(area, ["filled: finest mesh; hollow: coarser"])
 
 
-def _points(laid, name):
+def _outline_points(laid, name):
     """Points of an outline [mm], shape (n, 2)."""
     points = 1e3 * np.stack([laid[f"{name}_{axis}"].values for axis in "xy"], axis=1)
     return points[np.isfinite(points[:, 0])]
 
 
-def _shape(panel, laid, names):
-    """Draw the trapezoid, the reference and the finest solved network of one definition; return a note on them."""
-    panel.fill(*_points(laid, "trapezoid").T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
+def _draw_shape(panel, laid, names):
+    """Draw trapezoid, reference and the finest solved network; return a note that names them."""
+    panel.fill(*_outline_points(laid, "trapezoid").T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
     panel.axhline(0, color="0.45", linewidth=0.8)
-    reference, said = _points(laid, "reference"), "no reference"
+    reference, said = _outline_points(laid, "reference"), "no reference"
     if len(reference):
         panel.fill(*reference.T, facecolor="0.72", edgecolor="none")
         said = "grey: finite elements"
@@ -105,14 +105,14 @@ def _shape(panel, laid, names):
         strips = laid.sel(definition=definition)
         for place in np.flatnonzero(strips.status.values == 1)[:1]:
             strip = strips.isel(mesh_size=place)
-            points = _points(strip, "strip")
+            points = _outline_points(strip, "strip")
             panel.plot(*np.vstack([points, points[:1]]).T, color=style.line(1)["color"], linewidth=0.9)
             return f"{said}; line: {definition}, {1e3 * float(strip.mesh_size):g} mm"
     return f"{said}; no network was solved"
 
 
-def _dots(panel, laid, names, variable):
-    """Draw a dot a definition and mesh size, the finest filled; without any, write why."""
+def _draw_dots(panel, laid, names, variable):
+    """Draw a dot for each definition and mesh size, the finest filled; write the status if none is solved."""
     for number, definition in enumerate(names):
         strips, look = laid.sel(definition=definition), style.line(number)
         solved = np.flatnonzero(strips.status.values == 1)

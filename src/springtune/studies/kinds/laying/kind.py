@@ -24,11 +24,11 @@ LOADINGS = ("pressure", "gravity", "ends")
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes of a reference over the given one; the first gives the answer, all of them its band."""
 
-LAYING_WAY, LAID = ("loading", "friction"), ("definition", "mesh_size")
-OF_STRIP = (*LAID, *LAYING_WAY)
+LOADING, NETWORK = ("loading", "friction"), ("definition", "mesh_size")
+STRIP = (*NETWORK, *LOADING)
 """Labels of a strip of springs; a reference has the first ones."""
 
-BAND = "twice its spread over three meshes of finite elements"
+BAND_MEANING = "twice its spread over three meshes of finite elements"
 
 MOST_STRIPS = 10_000
 """Most strips that a study lays; each takes seconds."""
@@ -92,7 +92,7 @@ def _check(config, problems):
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
     check_able(problems, ("laying", "definition"), config.laying.definition, ["structured"])
-    check_product(problems, config.laying, ("laying",), OF_STRIP, MOST_STRIPS)
+    check_product(problems, config.laying, ("laying",), STRIP, MOST_STRIPS)
     beam = config.beams[config.laying.strip]
     for key, sizes in (("mesh_size", config.laying.mesh_size), ("reference_size", [config.laying.reference_size])):
         check_particles(problems, ("laying", key), sizes, beam.length, beam.height)
@@ -102,7 +102,7 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
-    """Labels and values of strips, and of those of finite elements that they are compared with."""
+    """Labels and values of network strips, and of finite-element strips to compare with."""
     section = config.laying
     beam, base = declared.beams[section.strip], section.trapezoid
     shared = {
@@ -114,10 +114,10 @@ def _expand(config, declared):
     }
     names = [name for name in DEFINITIONS if name in section.definition]
     ways = [*product([name for name in LOADINGS if name in section.loading], sorted(section.friction))]
-    strips = [dict(zip(OF_STRIP, (*one, *way))) for *one, way in product(names, sorted(section.mesh_size), ways)]
+    strips = [dict(zip(STRIP, (*one, *way))) for *one, way in product(names, sorted(section.mesh_size), ways)]
     found = [(labels, labels["definition"], [labels["mesh_size"]]) for labels in strips]
     sizes = [ratio * section.reference_size for ratio in REFERENCE_SIZES]
-    found += [(dict(zip(LAYING_WAY, way)), "delingette", sizes) for way in ways]
+    found += [(dict(zip(LOADING, way)), "delingette", sizes) for way in ways]
     return [(labels, shared | labels | {"definition": name, "mesh_sizes": sizes}) for labels, name, sizes in found]
 
 
@@ -128,34 +128,34 @@ def _tasks(study):
         yield Task(values, also, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
 
 
-def _outline(name, dimensions, whose):
+def _outline_variables(name, dimensions, whose):
     """Variables of the points of an outline."""
     return {f"{name}_{axis}": (dimensions, "m", f"{whose} along {axis}", nan) for axis in "xy"}
 
 
 LAYING_VARIABLES = {
-    "area_under_strip": (OF_STRIP, "m2", "area between the strip and the floor, network", nan),
-    "area_error": (OF_STRIP, "1", "area under the strip over the trapezoid's, less 1", nan),
-    "elongation": (OF_STRIP, "1", "elongation of the strip's lower fibre, network", nan),
-    "penetration": (OF_STRIP, "1", "largest penetration over the mesh size", nan),
-    "contact_force_error": (OF_STRIP, "1", "vertical contact force less the load, over the load", nan),
-    "load_share": (OF_STRIP, "1", "share of the load that was reached", nan),
-    "iterations": (OF_STRIP, "1", "Newton steps", nan),
-    "laying_seconds": (OF_STRIP, "s", "time to lay the strip", nan),
-    "status": (OF_STRIP, "1", "what became of the scene", 0),
-    "message": (OF_STRIP, "1", "why the strip is not laid", ""),
-    "skipped": (OF_STRIP, "1", "what the scene did not need", ""),
-    **_outline("strip", (*OF_STRIP, "outline_point"), "outline of the laid strip"),
-    "reference_area": (LAYING_WAY, "m2", "area between the strip and the floor, finite elements", nan),
+    "area_under_strip": (STRIP, "m2", "area between the strip and the floor, network", nan),
+    "area_error": (STRIP, "1", "area under the strip over the trapezoid's, less 1", nan),
+    "elongation": (STRIP, "1", "elongation of the strip's lower fibre, network", nan),
+    "penetration": (STRIP, "1", "largest penetration over the mesh size", nan),
+    "contact_force_error": (STRIP, "1", "vertical contact force less the load, over the load", nan),
+    "load_share": (STRIP, "1", "share of the load that was reached", nan),
+    "iterations": (STRIP, "1", "Newton steps", nan),
+    "laying_seconds": (STRIP, "s", "time to lay the strip", nan),
+    "status": (STRIP, "1", "what became of the scene", 0),
+    "message": (STRIP, "1", "why the strip is not laid", ""),
+    "skipped": (STRIP, "1", "what the scene did not need", ""),
+    **_outline_variables("strip", (*STRIP, "outline_point"), "outline of the laid strip"),
+    "reference_area": (LOADING, "m2", "area between the strip and the floor, finite elements", nan),
     "reference_area_error_estimate": (
-        LAYING_WAY, "m2", f"band of the area between strip and floor, {BAND}", nan,
+        LOADING, "m2", f"band of the area between strip and floor, {BAND_MEANING}", nan,
     ),
-    "reference_elongation": (LAYING_WAY, "1", "elongation of the lower fibre, finite elements", nan),
+    "reference_elongation": (LOADING, "1", "elongation of the lower fibre, finite elements", nan),
     "reference_elongation_error_estimate": (
-        LAYING_WAY, "1", f"band of the elongation of the lower fibre, {BAND}", nan,
+        LOADING, "1", f"band of the elongation of the lower fibre, {BAND_MEANING}", nan,
     ),
-    **_outline("reference", (*LAYING_WAY, "outline_point"), "outline of the strip of finite elements"),
-    **_outline("trapezoid", ("corner",), "corners of the trapezoid"),
+    **_outline_variables("reference", (*LOADING, "outline_point"), "outline of the strip of finite elements"),
+    **_outline_variables("trapezoid", ("corner",), "corners of the trapezoid"),
 }  # fmt: skip
 
 
@@ -164,7 +164,7 @@ KIND = StudyKind(
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid: group `/laying`.")},
     check=_check,
     expand=_expand,
-    axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in LAID},
+    axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in NETWORK},
     summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
     variables=LAYING_VARIABLES,
     dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},

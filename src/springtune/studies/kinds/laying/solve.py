@@ -29,13 +29,13 @@ from springtune.problem.status import Status
 from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
-RIGID = 1e4
+RIGID_MODULUS_RATIO = 1e4
 """Ratio of Young's moduli from which the trapezoid counts as rigid."""
 
 
 def solve(task):
-    """Rows of a strip; of one of finite elements with a band of what several meshes give."""
-    trapezoid, found = Trapezoid(**task["trapezoid"]), [_laid(task, size) for size in task["mesh_sizes"]]
+    """Rows of a strip; a reference has several meshes and an error band."""
+    trapezoid, found = Trapezoid(**task["trapezoid"]), [_strip_result(task, size) for size in task["mesh_sizes"]]
     first, is_reference = found[0], len(found) > 1
     points, name = first.pop("outline", np.empty((0, 2))).tolist(), "reference" if is_reference else "strip"
     rows = [{"outline_point": place, f"{name}_x": x, f"{name}_y": y} for place, (x, y) in enumerate(points)]
@@ -50,8 +50,8 @@ def solve(task):
     return {"rows": [first, *rows]}
 
 
-def _laid(task, size):
-    """Result of a strip on a mesh; one that is not laid has a status and a message."""
+def _strip_result(task, size):
+    """Lay a strip on a mesh; a failure has a status and a message."""
     made = {
         "strip": Strip(**task["strip"]),
         "trapezoid": Trapezoid(**task["trapezoid"]),
@@ -71,20 +71,20 @@ def _laid(task, size):
 
 
 def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,
-        rigid=RIGID):  # fmt: skip
+        rigid=RIGID_MODULUS_RATIO):  # fmt: skip
     """Lay a strip on a trapezoid [m, Pa], which is rigid from a ratio `rigid` of Young's moduli on.
 
     Returns results by their names in the dataset: `penetration` over the mesh size, `contact_force_error` over the load
     (NaN for drawn ends), `outline` of shape (n, 2) [m].
     """
     begin = time.perf_counter()
-    body, mesh = _strip(strip, trapezoid, material, definition, size, loading, pressure)
+    body, mesh = _strip_body(strip, trapezoid, material, definition, size, loading, pressure)
     skipped = ["unknowns of the floor"]
     if support.young_modulus >= rigid * material.young_modulus:
         contact = Contact([body], [Obstacle(np.array(trapezoid.corners))], floor=True, size=size, friction=friction)
         skipped.append("the trapezoid's deformation: it is rigid beside the strip")
     else:
-        below = _support(strip, trapezoid, support, size)
+        below = _trapezoid_body(strip, trapezoid, support, size)
         contact = Contact([body, below], floor=True, size=size, friction=friction)
     message = ""
     try:
@@ -115,11 +115,12 @@ def lay(strip, trapezoid, material, support, definition, size, *, loading="press
     )
 
 
-def _strip(strip, trapezoid, material, definition, size, loading, pressure):
+def _strip_body(strip, trapezoid, material, definition, size, loading, pressure):
+    """Make the strip, loaded and held in its middle, and its mesh."""
     made = MESH_TYPES["structured"](strip.length, strip.height, size)
     mesh = Mesh(made.points + [-0.5 * strip.length, trapezoid.height], made.triangles, made.quads)
-    sheet = MeshCache(mesh, strip.thickness)
-    springs, _ = sheet.derive(definition, material)
+    cache = MeshCache(mesh, strip.thickness)
+    springs, _ = cache.derive(definition, material)
     held = np.zeros(mesh.points.shape, dtype=bool)
     # Without friction the strip would slide off to one side.
     held[np.abs(mesh.points[:, 0]) <= 1e-9 * strip.length, 0] = True
@@ -135,18 +136,18 @@ def _strip(strip, trapezoid, material, definition, size, loading, pressure):
         ends = low & (np.abs(np.abs(mesh.points[:, 0]) - 0.5 * strip.length) <= 1e-9 * strip.length)
         held[ends, 1] = True
         arguments = {"prescribed": np.where(ends[:, None], [0.0, -trapezoid.height], 0.0)}
-    return Body(sheet.network(held, springs), springs.reference, **arguments), mesh
+    return Body(cache.network(held, springs), springs.reference, **arguments), mesh
 
 
-def _support(strip, trapezoid, material, size):
-    """The trapezoid, of linear triangles (`delingette`): a negative area modulus fails at its corners."""
+def _trapezoid_body(strip, trapezoid, material, size):
+    """Make the trapezoid of linear triangles (`delingette`): a negative area modulus fails at its corners."""
     mean = 0.5 * (trapezoid.lower_base + trapezoid.upper_base)
     made = MESH_TYPES["structured"](mean, trapezoid.height, size)
     y = made.points[:, 1]
     width = trapezoid.lower_base + (trapezoid.upper_base - trapezoid.lower_base) * y / trapezoid.height
     mesh = Mesh(np.stack([(made.points[:, 0] / mean - 0.5) * width, y], axis=1), made.triangles)
-    sheet = MeshCache(mesh, strip.thickness)
-    springs, _ = sheet.derive("delingette", material)
+    cache = MeshCache(mesh, strip.thickness)
+    springs, _ = cache.derive("delingette", material)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.lexsort((np.abs(mesh.points[:, 0]), y))[0], 0] = True
-    return Body(sheet.network(held, springs), springs.reference, moves_little=True)
+    return Body(cache.network(held, springs), springs.reference, moves_little=True)

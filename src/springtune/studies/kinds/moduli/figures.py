@@ -11,7 +11,7 @@ from ...output.selection import choose, group, labelled_beam, labels_of, sign_of
 
 
 def definitions(tree):
-    """Figures that compare definitions: moduli, and by mesh type errors of the beam and kinematics with most scenes."""
+    """Yield the figures of moduli, and of errors by mesh type for the beam and kinematics with most scenes."""
     yield "definitions_moduli", plot_moduli, {}
     root = unswept(group(tree, "/"))
     for mesh_type in labels_of(root.status != 0, "mesh_type"):
@@ -59,7 +59,7 @@ def plot_moduli(data, ax=None):
 
 
 def _moduli(panel, here):
-    """Draw the moduli of one mesh type; return notes, and what to say without lines."""
+    """Draw the moduli of one mesh type; return notes, and a message if there are none."""
     panel.set(xlabel="asked for", ylabel="effective")
     curves, lacking, wanted = {}, [], here.poisson_ratio.values
     for definition in here.definition.values:
@@ -120,7 +120,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)
     root = root.sel(chosen)
     solved = root.status == 1
-    materials = _spread(root, solved) if materials is None else materials
+    materials = _default_materials(root, solved) if materials is None else materials
     for material in materials:
         choose(root.status != 0, material=material)
     if solved.any():
@@ -160,8 +160,8 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     return labels.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
 
 
-def _spread(root, solved):
-    """The first, middle and last material by Poisson's ratio, of those with most loads."""
+def _default_materials(root, solved):
+    """First, middle and last material by Poisson's ratio, among those with most loads."""
     counts = solved.any("mesh_size").sum(["definition", "load"]).values
     full = np.flatnonzero(counts > 0.5 * counts.max() if counts.any() else counts == 0)
     order = full[np.argsort(root.material_poisson_ratio.values[full], kind="stable")]

@@ -44,7 +44,7 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
-    """Box of the patches, whose thickness does not matter, and labels of each definition that derives a stiffness."""
+    """Box of the patches, and labels of each definition that derives a stiffness; thickness does not matter."""
     found = {}
     for grid in config.grids.values():
         if grid.moduli:
@@ -72,15 +72,15 @@ def _tasks(study):
     box, cells = study.parts["moduli"]
     for labels in cells:
         definition, mesh_type, size, ratio = labels.values()
-        mesh, name = _mesh_of(study, box, mesh_type, size), f"{mesh_type}_{1e3 * size:g}mm"
+        mesh, name = _patch_mesh(study, box, mesh_type, size), f"{mesh_type}_{1e3 * size:g}mm"
         also = parameters(mesh_source(mesh)), mesh_type_key(mesh_type), definition_key(definition)
         values = {"definition": definition, "poisson_ratio": ratio}
         seconds = expected_seconds(particles(mesh.beam.length * mesh.beam.height, size), definition)
         yield Task(values, also, labels, seconds, name, file=name, shared={"mesh": mesh_source(mesh)})
 
 
-def _mesh_of(study, box, mesh_type, size):
-    """Mesh of a patch test: of the box, or from the file of the shortest beam."""
+def _patch_mesh(study, box, mesh_type, size):
+    """Mesh of a patch test: generated for the box, or the file of the smallest beam."""
     if mesh_type in MESH_TYPES:
         return MeshSpec(box, mesh_type, size)
     found = [mesh for label, mesh in study.mesh_files.items() if label[::2] == (mesh_type, size)]

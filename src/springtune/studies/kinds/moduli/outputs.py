@@ -38,17 +38,17 @@ VIEWS = (
     ),
 )
 
-COARSENESS = {0.05: "up to 0.05", 0.1: "0.05 to 0.1", float("inf"): "above 0.1"}
+MESH_SIZES_OVER_HEIGHT = {0.05: "up to 0.05", 0.1: "0.05 to 0.1", float("inf"): "above 0.1"}
 """Largest mesh sizes over the height of the beam [1] of fine, middle and coarse meshes, and their texts."""
 
-NOTE = (
+TABLE_NOTE = (
     "Lowest and highest deformation error over beams and mesh sizes. Beyond small strain a reference does not apply, "
     "and the error is not the network's alone."
 )
 
 
 def tables(tree):
-    """Table of the page: the range of each definition's errors by mesh type, material, load and mesh size."""
+    """Make the table of error ranges by definition, mesh type, material, load and mesh size."""
     import pandas as pd  # here, since a plan does without it and xarray
 
     from ...output.dataset import most_requested
@@ -62,8 +62,8 @@ def tables(tree):
     cells = root[["deformation_error", "status", "reference_applies"]].assign(ratio=root.mesh_size / root.beam_height)
     frame = cells.to_dataframe([*place, "beam", "mesh_size"]).reset_index()
     frame = frame[frame.status != 0]
-    ends = [0.0, *(end * (1 + 1e-9) for end in COARSENESS)]
-    frame["mesh_size_over_height"] = pd.cut(frame.ratio, ends, labels=[*COARSENESS.values()]).astype(str)
+    ends = [0.0, *(end * (1 + 1e-9) for end in MESH_SIZES_OVER_HEIGHT)]
+    frame["mesh_size_over_height"] = pd.cut(frame.ratio, ends, labels=[*MESH_SIZES_OVER_HEIGHT.values()]).astype(str)
     frame["solved"] = frame.status == 1
     frame["beyond"] = frame.solved & (frame.reference_applies == 0)
     frame["error"] = 100 * frame.deformation_error.where(frame.solved)
@@ -75,4 +75,4 @@ def tables(tree):
         highest_error_percent=("error", "max"),
     )
     rows = ranges.reset_index().to_dict("records")
-    return [{"stem": "definitions", "title": "Definitions compared", "note": NOTE, "rows": rows}]
+    return [{"stem": "definitions", "title": "Definitions compared", "note": TABLE_NOTE, "rows": rows}]

@@ -9,12 +9,12 @@ from ..bodies.stored import make_beam
 
 
 def prepare(patch, content):
-    """Moduli of the mesh of a patch, which definitions share."""
+    """Moduli of the mesh of a patch, shared by definitions."""
     return MeshModuli(make_beam(patch["mesh"]))
 
 
 def solve(task, moduli):
-    """Errors of E and G [1], effective Poisson's ratio, and what the definition cost; or why there are none."""
+    """Errors of E and G [1], effective Poisson's ratio and cost of a definition, or a message."""
     try:
         made = Material if task["poisson_ratio"] <= 0.5 else InPlane  # as of materials in plane strain alone
         found = moduli(made(1.0, task["poisson_ratio"]), task["definition"])

@@ -19,29 +19,29 @@ from ...runs import store
 from ..bodies import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
-from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key
+from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
 from .outputs import QUANTITIES
 from .solve import DRAWN
 
-OF_REFERENCES = ("sample", "load")
-OF_NETWORKS = ("sample", "load", "definition")
+REFERENCE = ("sample", "load")
+NETWORK = ("sample", "load", "definition")
 
 REFERENCE_BOUND = "bound on the relative error of the reference, that of its interpolation included"
-HOW_FAR = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
+APPLIES = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
 
 SAMPLES = Group(
     "/samples",
     {
-        "displacement": (OF_NETWORKS, "m", "displacement of the loaded side, network", nan),
-        "deformation_error": (OF_NETWORKS, "1", "(network - reference) / |reference|, signed", nan),
-        "stiffness": (OF_NETWORKS, "N/m", "stiffness of all springs, where they have one", nan),
-        "status": (OF_NETWORKS, "1", "what became of the scene", 0),
-        "message": (OF_NETWORKS, "1", "why the scene is not solved", ""),
-        "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", nan),
-        "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, nan),
-        "reference_applies": (OF_REFERENCES, "1", HOW_FAR, np.int8(0)),
+        "displacement": (NETWORK, "m", "displacement of the loaded side, network", nan),
+        "deformation_error": (NETWORK, "1", "(network - reference) / |reference|, signed", nan),
+        "stiffness": (NETWORK, "N/m", "stiffness of all springs, where they have one", nan),
+        "status": (NETWORK, "1", "what became of the scene", 0),
+        "message": (NETWORK, "1", "why the scene is not solved", ""),
+        "reference_displacement": (REFERENCE, "m", "displacement of the loaded side, finite elements", nan),
+        "reference_error_estimate": (REFERENCE, "1", REFERENCE_BOUND, nan),
+        "reference_applies": (REFERENCE, "1", APPLIES, np.int8(0)),
         "reference_message": (("load",), "1", "why there is no reference", ""),
-        "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", nan),
+        "best_stiffness": (REFERENCE, "N/m", "uniform stiffness without a deformation error", nan),
         "particles": (("sample",), "1", "number of particles", 0),
     },
     dimensions={"sample": "row of the design"},
@@ -49,7 +49,7 @@ SAMPLES = Group(
 )
 
 INDEX = ("quantity", "parameter", "load", "definition")
-OF_BASE = ("quantity", "load", "definition")
+BASE = ("quantity", "load", "definition")
 
 ORDERS = {
     "first": "first-order Sobol index: share of the variance by the parameter alone",
@@ -66,17 +66,17 @@ SOBOL = Group(
         for end, meaning in zip(ENDS, (about, "lower end of its bootstrap band", "upper end of its bootstrap band"))
     }
     | {
-        "base_samples": (OF_BASE, "1", "base samples that the indices are of", 0),
-        "base_samples_without": (OF_BASE, "1", "base samples with a scene that has no value", 0),
+        "base_samples": (BASE, "1", "base samples that the indices are of", 0),
+        "base_samples_without": (BASE, "1", "base samples with a scene that has no value", 0),
     },
     dimensions={"quantity": "what is looked at", "parameter": "parameter that varies"},
 )
 
 
 def groups(study, folder):
-    """Groups of a dataset, see `springtune.studies.kinds.bodies.collect.groups`."""
+    """Build the groups of a dataset."""
     sample = study.parts["samples"]
-    drawn, results = _stored(sample, folder / "samples")
+    drawn, results = _read_results(sample, folder / "samples")
     axes = study.axes | {
         "sample": tuple(range(sample.rows)),
         "parameter": sample.varied,
@@ -84,21 +84,21 @@ def groups(study, folder):
     }
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
-    group, places = _with_coordinates(sample, drawn, study.axes)
+    group, places = _coordinates(sample, drawn, study.axes)
     frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
-    frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
+    frames += chain.from_iterable(_load_rows(load, sample, drawn, results, folder / "samples") for load in sample.loads)
     data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
     data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type")}
     data.attrs["kinematics"] = "linear"
     data.attrs["varied"] = " ".join(sample.varied)
     found = {SAMPLES.name: data}
     if sample.design == SOBOL_INDICES:
-        found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(OF_INDICES)
+        found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(SOBOL_ATTRIBUTES)
     return found
 
 
-def _stored(sample, folder):
-    """Parameters of all rows, and results by key: displacement, status, particles and message of each row."""
+def _read_results(sample, folder):
+    """Read the parameters of all rows, and displacement, status, particles and message of each row by result key."""
     keys = sorted({result_key(sample, load, name) for load in sample.loads for name in sample.solved})
     names = [*dict.fromkeys([*sample.drawn, "mesh_size"])]
     paths = [folder / f"{block_key(sample, *ends)}.h5" for ends in blocks(sample.design, sample.size)]
@@ -109,17 +109,17 @@ def _stored(sample, folder):
 
 
 def _frame(found):
-    """Arrays of a block, and the message of each row."""
+    """Table of the arrays and messages of a block."""
     frame = pd.DataFrame({name: values for name, values in found.items() if name != "messages"})
     return frame.assign(message=[found.get("messages", {}).get(str(row), "") for row in frame.index])
 
 
-def _of_load(load, sample, drawn, results, folder):
-    """References, networks, their errors, and the uniform stiffness without an error under a load."""
+def _load_rows(load, sample, drawn, results, folder):
+    """Yield references, networks, errors and the best uniform stiffness of a load."""
     kind, sign = LOADS[load].kind, LOADS[load].sign
     body, softness = SimpleNamespace(**drawn), COEFFICIENT * (drawn["young_modulus"] * drawn["thickness"])
     body.in_plane = body  # sheets of samples are in plane stress
-    answers, why = _answers(sample, drawn, folder, kind, drawn["length"] / drawn["height"])
+    answers, why = _unit_references(sample, drawn, folder, kind, drawn["length"] / drawn["height"])
     _, scale = unit_scales(body, body, kind)
     reference = sign * drawn["force"] * scale * answers.displacement
     uniform = results[result_key(sample, load, UNIFORM)]
@@ -143,14 +143,14 @@ def _of_load(load, sample, drawn, results, folder):
         yield pd.DataFrame(rows | {"definition": name} | values)
 
 
-def _answers(sample, drawn, folder, kind, aspects):
-    """Answers of the unit problem of each row, and why some are missing."""
+def _unit_references(sample, drawn, folder, kind, aspects):
+    """Return the unit reference of each row, and why some are missing."""
     key, ratios = reference_key(sample, kind), drawn["poisson_ratio"]
     interpolant, alone, _, why = any_reference.read_interpolant(folder, key)
     if interpolant:
         return interpolant.evaluate(aspects, ratios), ""
-    if sample.rows > MOST_SOLVED:
-        why += f"; up to {MOST_SOLVED} points they would be solved one by one"
+    if sample.rows > MOST_SOLVED_ROWS:
+        why += f"; up to {MOST_SOLVED_ROWS} points they would be solved one by one"
     rows = [alone.get(problem_key(key, *pair), {"message": why}) for pair in zip(aspects, ratios)]
     names = any_reference.ANSWERS
     answers = SimpleNamespace(**{name: np.array([row.get(name, np.nan) for row in rows]) for name in names})
@@ -158,8 +158,8 @@ def _answers(sample, drawn, folder, kind, aspects):
     return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""
 
 
-def _with_coordinates(sample, drawn, dimensions):
-    """The group with coordinates of each row, and their values: parameters, base sample, and role in it."""
+def _coordinates(sample, drawn, dimensions):
+    """Return the group with coordinates of each row, and their values: parameters, base sample and role."""
     parts, variables, places = roles(sample.design, sample.varied), {}, {}
     for name, values in drawn.items():
         # A coordinate must not have the name of a dimension that it does not run along, here or in the root.
@@ -173,11 +173,11 @@ def _with_coordinates(sample, drawn, dimensions):
     return replace(SAMPLES, variables=SAMPLES.variables | variables, flags={"role": tuple(parts)}), places
 
 
-LEFT_OUT = "where a scene has no value the whole base sample is left out; base_samples_without counts them"
+FAILURES = "where a scene has no value the whole base sample is left out; base_samples_without counts them"
 
 
-def _values(sample, data):
-    """Labels of each quantity, load and definition, and values by row, NaN where a scene is not solved stably."""
+def _quantities(sample, data):
+    """Yield the labels of each quantity, load and definition, and values by row, NaN if not solved."""
     for quantity, load, name in product(QUANTITIES, sample.loads, sample.definitions):
         one = data[[quantity, "status"]].sel(load=load, definition=name)
         values = one[quantity].values
@@ -187,8 +187,8 @@ def _values(sample, data):
 
 
 def _indices(sample, data):
-    """Sobol indices of each quantity, load and definition."""
-    for labels, values in _values(sample, data):
+    """Yield the Sobol indices of each quantity, load and definition."""
+    for labels, values in _quantities(sample, data):
         rows = values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)
         kept = rows[:, there]
@@ -200,19 +200,19 @@ def _indices(sample, data):
         yield pd.DataFrame(labels | {"parameter": sample.varied} | sobol_indices(kept[0], kept[1], kept[2:], least))
 
 
-RESAMPLES = 1000
+BOOTSTRAP_SAMPLES = 1000
 
-LEVEL = 0.95
+BAND_LEVEL = 0.95
 """Share of bootstrap samples within a band."""
 
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE_DEVIATION = 1e-12
 """Smallest standard deviation over the largest value that is more than rounding."""
 
 
-OF_INDICES = {
+SOBOL_ATTRIBUTES = {
     "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
-    "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
-    "failures": LEFT_OUT,
+    "bands": f"between percentiles of {BOOTSTRAP_SAMPLES} bootstrap samples, {100 * BAND_LEVEL:g} %",
+    "failures": FAILURES,
 }
 """Attributes of the group."""
 
@@ -241,7 +241,7 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     count, rows = at_ab.shape
     both = np.concatenate([at_a, at_b])
     largest = np.abs(both).max(initial=0.0)
-    if rows < 2 or not largest > 0 or not np.std(both / largest) > max(NEGLIGIBLE, least / largest):
+    if rows < 2 or not largest > 0 or not np.std(both / largest) > max(NEGLIGIBLE_DEVIATION, least / largest):
         return {f"{order}_order{end}": np.full(count, np.nan) for order in ORDERS for end in ENDS}
     # Standardized: else sums would lose digits, and squares might overflow.
     mean, size = (both / largest).mean(), (both / largest).std()
@@ -250,9 +250,9 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     terms = np.concatenate([at_b * (at_ab - at_a), 0.5 * (at_a - at_ab) ** 2, [(at_a + at_b) / 2],
                             [(at_a**2 + at_b**2) / 2]])  # fmt: skip
     random = np.random.default_rng(0)
-    counts = (np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in range(RESAMPLES))
+    counts = (np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in range(BOOTSTRAP_SAMPLES))
     means = np.array([terms.mean(axis=1), *(terms @ count / rows for count in counts)])
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
-    values = found[0], *np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+    values = found[0], *np.quantile(found[1:], [(1 - BAND_LEVEL) / 2, (1 + BAND_LEVEL) / 2], axis=0)
     halves = zip(ORDERS, (slice(count), slice(count, None)))
     return {f"{order}_order{end}": one[half] for order, half in halves for end, one in zip(ENDS, values)}

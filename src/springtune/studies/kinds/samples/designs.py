@@ -27,10 +27,10 @@ DESIGNS = (SOBOL_INDICES, "sobol")
 
 SMALLEST_SIZE = 8
 
-BASE_ROWS = 64
+MOST_SALTELLI_SAMPLES = 64
 """Most base samples of a task of `SOBOL_INDICES`; they have some hundred rows."""
 
-PLAIN_ROWS = 512
+MOST_SOBOL_POINTS = 512
 """Most base samples of a task of plain Sobol points; each is one row."""
 
 
@@ -42,7 +42,7 @@ def blocks(design: str, size: int) -> list[tuple[int, int]]:
     >>> blocks("sobol-indices", 16), blocks("sobol-indices", 32)
     ([(0, 8), (8, 16)], [(0, 8), (8, 16), (16, 32)])
     """
-    most = BASE_ROWS if design == SOBOL_INDICES else PLAIN_ROWS
+    most = MOST_SALTELLI_SAMPLES if design == SOBOL_INDICES else MOST_SOBOL_POINTS
     ends = [0, SMALLEST_SIZE]
     while ends[-1] < size:
         ends.append(ends[-1] + min(ends[-1], most))

@@ -9,11 +9,12 @@ PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": 
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
 """Names of parameters on an axis, where they are not their own."""
 
-INDEX_ENDS = -0.3, 1.5
+INDEX_LIMITS = -0.3, 1.5
 """Ends of the axis of Sobol indices at most, whose bands may go farther."""
 
 
-def _words(name):
+def _parameter_name(name):
+    """Name of a parameter on an axis."""
     return PARAMETER_WORDS.get(name, name.replace("_", " "))
 
 
@@ -60,7 +61,7 @@ def plot_sobol(data, ax=None, *, load=None):
             look = "0.35" if alone else style.line(order.index(definition))["color"]
             shown.setdefault(title, (found.sel(quantity=quantity, definition=definition), look))
     bands = found[[name for name in found if name.endswith(("_low", "_high"))]].to_array()
-    low, high = max(min(0.0, bands.min()), INDEX_ENDS[0]), min(max(1.0, bands.max()), INDEX_ENDS[1])
+    low, high = max(min(0.0, bands.min()), INDEX_LIMITS[0]), min(max(1.0, bands.max()), INDEX_LIMITS[1])
 
     def draw(panel, part):
         indices, colour = part
@@ -71,7 +72,7 @@ def plot_sobol(data, ax=None, *, load=None):
             panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
             panel.hlines(places + shift, *ends, color="k", linewidth=0.8)
         panel.set(xlim=(low - 0.02, high + 0.02), ylim=(len(names) - 0.45, -0.55), xlabel="share of the variance")
-        panel.set_yticks(range(len(names)), [_words(name) for name in names])
+        panel.set_yticks(range(len(names)), [_parameter_name(name) for name in names])
         panel.tick_params(axis="y", length=0)
         panel.grid(False, axis="y")
         if not np.isfinite(indices.first_order.values).any():
@@ -91,6 +92,6 @@ def plot_sobol(data, ax=None, *, load=None):
 
 
 def sobol(tree):
-    """Stem, function that plots, and selection of each figure."""
+    """Yield the figure of each load: stem, plot function and selection."""
     for load in labels_of((tree["samples"].to_dataset().status != 0).any("sample"), "load"):
         yield f"sobol_{load}", plot_sobol, {"load": load}

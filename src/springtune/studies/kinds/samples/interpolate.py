@@ -12,7 +12,7 @@ from .designs import draw
 
 
 def run(content: dict[str, Any], attempts: Attempts) -> None:
-    """Build the interpolants that are not there yet."""
+    """Build the missing interpolants."""
     for file in content["files"]:
         (task,), pairs = file["tasks"], set()
         if file["sample"]:
@@ -25,5 +25,5 @@ def run(content: dict[str, Any], attempts: Attempts) -> None:
 
 
 def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
-    """Key of a reference that is solved by itself, in the file of the interpolant that it lacks."""
+    """Key of a reference that is solved alone, in the file of the interpolant that could not be built."""
     return f"{interpolant} {float(aspect_ratio)!r} {float(nu)!r}"

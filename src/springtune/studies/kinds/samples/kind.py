@@ -22,7 +22,7 @@ from ...runs.source import hash_of
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
 from .outputs import OUTPUTS
 
-FURTHER_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
+SHAPE_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
 """Keys of each distribution besides its ends."""
 
 _NUMBERS: dict[str, Any] = {
@@ -32,12 +32,12 @@ _NUMBERS: dict[str, Any] = {
 
 
 class DistributionConfig(Section):
-    """The distribution to draw a parameter from; `distributed` adds its numbers."""
+    """The distribution to draw a parameter from; `parameter` adds its numbers."""
 
-    distribution: Annotated[str, *one_of("distribution", FURTHER_KEYS)] = "uniform"
+    distribution: Annotated[str, *one_of("distribution", SHAPE_KEYS)] = "uniform"
 
 
-def distributed(name: str, example: str) -> Any:
+def parameter(name: str, example: str) -> Any:
     """Notes of a parameter: a value, or the distribution to draw it from."""
     kind: Any = _NUMBERS.get(name) or Annotated[float, *quantity(PARAMETERS[name][0])]
     keys: dict[str, Any] = {key: (kind, Field(alias=alias)) for key, alias in (("low", "from"), ("high", "to"))}
@@ -47,7 +47,7 @@ def distributed(name: str, example: str) -> Any:
 
     def read(value: object) -> dict[str, Any]:
         if isinstance(value, dict | list):
-            return _checked(name, section.model_validate(value))
+            return _distribution(name, section.model_validate(value))
         number = alone.validate_python(value)
         return {"distribution": "fixed", "low": number, "high": number}
 
@@ -59,16 +59,16 @@ def distributed(name: str, example: str) -> Any:
     return BeforeValidator(read), OrSection(section), Field(title=title, json_schema_extra=or_section)
 
 
-def _checked(name: str, section: DistributionConfig) -> dict[str, Any]:
-    """Distribution whose keys go together."""
+def _distribution(name: str, section: DistributionConfig) -> dict[str, Any]:
+    """Check that the keys of a distribution fit, and return them."""
     kind = section.distribution
     read = {key: value for key, value in section if key != "distribution" and value is not None}
     texts = {key: show(number_text(value, PARAMETERS[name][2])) for key, value in read.items()}
     low, high = read["low"], read["high"]
-    for key in FURTHER_KEYS[kind]:
+    for key in SHAPE_KEYS[kind]:
         if key not in read:
-            raise refuse(f"'{key}' is missing; a {kind} distribution needs {' and '.join(FURTHER_KEYS[kind])}", key)
-    for key in read.keys() - {"low", "high", *FURTHER_KEYS[kind]}:
+            raise refuse(f"'{key}' is missing; a {kind} distribution needs {' and '.join(SHAPE_KEYS[kind])}", key)
+    for key in read.keys() - {"low", "high", *SHAPE_KEYS[kind]}:
         raise refuse(f"a {kind} distribution has no '{key}'; remove it", key)
     if not low < high:
         ends = f"{texts['low']} is not below 'to', {texts['high']}"
@@ -83,7 +83,7 @@ def _checked(name: str, section: DistributionConfig) -> dict[str, Any]:
     return {"distribution": kind} | read
 
 
-MOST_SOLVED = 1024
+MOST_SOLVED_ROWS = 1024
 """Most rows of a sample whose references are solved one by one where they cannot be interpolated."""
 
 UNIFORM = "uniform"
@@ -102,28 +102,28 @@ class ParametersConfig(Section):
     deviation: 2 mm, to: 48 mm, distribution: normal}` is cut off at its ends.
     """
 
-    length: Annotated[Drawn, *distributed("length", "{from: 100 mm, to: 400 mm}")]
+    length: Annotated[Drawn, *parameter("length", "{from: 100 mm, to: 400 mm}")]
     """Along x."""
 
-    height: Annotated[Drawn, *distributed("height", "{from: 20 mm, to: 80 mm}")]
+    height: Annotated[Drawn, *parameter("height", "{from: 20 mm, to: 80 mm}")]
     """Along y."""
 
-    thickness: Annotated[Drawn, *distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
+    thickness: Annotated[Drawn, *parameter("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
     """Out of the plane."""
 
-    mesh_size: Annotated[Drawn, *distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
+    mesh_size: Annotated[Drawn, *parameter("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
     """At most the smaller side of any beam. Give this or `relative_mesh_size`."""
 
-    relative_mesh_size: Annotated[Drawn, *distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
+    relative_mesh_size: Annotated[Drawn, *parameter("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
     """Mesh size over height."""
 
-    young_modulus: Annotated[Drawn, *distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
+    young_modulus: Annotated[Drawn, *parameter("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
     """Young's modulus E."""
 
-    poisson_ratio: Annotated[Drawn, *distributed("poisson_ratio", "{from: 0, to: 0.5}")]
+    poisson_ratio: Annotated[Drawn, *parameter("poisson_ratio", "{from: 0, to: 0.5}")]
     """Poisson's ratio nu."""
 
-    force: Annotated[Drawn, *distributed("force", "{from: 1 kN, to: 20 kN}")]
+    force: Annotated[Drawn, *parameter("force", "{from: 1 kN, to: 20 kN}")]
     """Size of the force. The load gives the sign."""
 
 
@@ -184,7 +184,7 @@ class SamplesConfig(Section):
 
     @property
     def solved(self) -> list[str]:
-        """Definitions whose networks are solved: uniform springs tell the best stiffness."""
+        """Definitions whose networks are solved; uniform springs give the best stiffness."""
         return list(dict.fromkeys([*self.definitions, UNIFORM]))
 
     @property
@@ -267,39 +267,40 @@ def _summary(sample):
 
 
 def reference_box(sample):
-    """First and last aspect ratio, and first and last Poisson's ratio."""
+    """Range of aspect ratios, and of Poisson's ratios."""
     length, height, ratio = (sample.drawn[name] for name in ("length", "height", "poisson_ratio"))
     return [length["low"] / height["high"], length["high"] / height["low"]], [ratio["low"], ratio["high"]]
 
 
 def reference_key(sample, kind):
-    """Key of the references of a kind of load, as one function."""
+    """Key of the interpolated references of a kind of load."""
     code = stage_key(INTERPOLATE, without=("studies.kinds.samples.designs",))
     return hash_of(kind.name, reference_box(sample), code)
 
 
 def block_key(sample, first, last):
-    """Key of the parameters of some base samples, and stem of the file of their results on meshes of any type."""
+    """Key of the parameters of some base samples; it names the file of their results."""
     code = stage_key("studies.kinds.samples.designs")
     return hash_of(sample.design, sample.seed, sample.drawn, first, last, code)
 
 
 @cache
-def _solved_with(mesh_type, definition):
+def _code_of_networks(mesh_type, definition):
+    """Key of the code that solves networks of a mesh type and definition."""
     return hash_of(stage_key(SOLVE), mesh_type_key(mesh_type), definition_key(definition))
 
 
 def result_key(sample, load, definition):
-    """Key of the scenes of a load and definition in the file of any base samples."""
-    solved_with = _solved_with(sample.mesh_type, definition)
+    """Key of the scenes of a load and definition in the file of a block."""
+    solved_with = _code_of_networks(sample.mesh_type, definition)
     return hash_of(LOADS[load].kind.name, sample.mesh_type, solved_with)
 
 
-def _references(study):
-    """Tasks of the references, one a kind of load."""
+def _reference_tasks(study):
+    """Yield the task of the references of each kind of load."""
     sample = study.parts["samples"]
     drawn, box = None, reference_box(sample)
-    if sample.rows <= MOST_SOLVED:
+    if sample.rows <= MOST_SOLVED_ROWS:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.drawn}
         drawn |= {"first": 0, "last": sample.size}
     for kind in dict.fromkeys(LOADS[name].kind for name in sample.loads):
@@ -307,8 +308,8 @@ def _references(study):
         yield Task(values, seconds=1.0, name=kind.name, file=key, key=key, shared={"sample": drawn})
 
 
-def _blocks(study):
-    """Tasks of some base samples each; those of a sample of half the size are the first of them."""
+def _block_tasks(study):
+    """Yield a task for each block of base samples; half the size has the first of them."""
     sample = study.parts["samples"]
     scenes = {
         result_key(sample, load, definition): {"kind": LOADS[load].kind.name, "definition": definition}
@@ -338,8 +339,8 @@ KIND = StudyKind(
     axes=lambda sample: {"load": set(sample.loads), "definition": set(sample.definitions)},
     summary=_summary,
     stages=(
-        Stage("interpolate", INTERPOLATE, _references, folder="samples"),
-        Stage("sample", SOLVE, _blocks, folder="samples"),
+        Stage("interpolate", INTERPOLATE, _reference_tasks, folder="samples"),
+        Stage("sample", SOLVE, _block_tasks, folder="samples"),
     ),
     outputs=OUTPUTS,
     tables=_tables,

@@ -36,7 +36,7 @@ OUTPUTS = (
     ),
 )
 
-OF_ERRORS = {"quantity": "deformation_error"}
+ERROR_SELECTION = {"quantity": "deformation_error"}
 
 VIEWS = (
     View(
@@ -59,8 +59,8 @@ VIEWS = (
         "What matters",
         "Sobol indices: shares of a quantity's variance by each parameter alone, and in all that it takes part in.",
         (
-            Plot("total order", "total_order", "parameter", "definition", "points", selection=OF_ERRORS),
-            Plot("first order", "first_order", "parameter", "definition", "points", selection=OF_ERRORS),
+            Plot("total order", "total_order", "parameter", "definition", "points", selection=ERROR_SELECTION),
+            Plot("first order", "first_order", "parameter", "definition", "points", selection=ERROR_SELECTION),
             Plot("total order by quantity", "total_order", "parameter", "quantity", "map"),
         ),
     ),

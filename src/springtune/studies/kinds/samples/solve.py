@@ -23,23 +23,23 @@ from .designs import draw
 DRAWN = "drawn"
 """Key of the parameters among the results of a task."""
 
-TOGETHER = 32
+TASKS_TOGETHER = 32
 """Tasks whose meshes are sorted together; among more tasks more meshes share cells."""
 
-SCALES = 1e-7
+SCALING_TOLERANCE = 1e-7
 """Largest relative difference of a scaled result from a solved one: rounding."""
 
 
 def run(content, attempts):
-    """Solve the scenes of a bundle that are not stored yet."""
+    """Solve the scenes of a bundle that are not stored."""
     waiting = []
     for file in content["files"]:
         path = Path(content["folder"]) / f"{file['name']}.h5"
         present = store.stored(path)
         if not {DRAWN, *file["results"]} <= present:
             waiting.append(_Block(file, path, present))
-    for begin in range(0, len(waiting), TOGETHER):
-        _solve_together(waiting[begin : begin + TOGETHER], attempts)
+    for begin in range(0, len(waiting), TASKS_TOGETHER):
+        _solve_together(waiting[begin : begin + TASKS_TOGETHER], attempts)
 
 
 class _Block:
@@ -71,7 +71,7 @@ class _Block:
         return found
 
     def keep(self, key, rows, scale, result):
-        """Keep a result for the scenes of some rows, times a scale each."""
+        """Store a result for some rows, each times its scale."""
         found = self.found[key]
         found["displacement"][rows] = result["displacement"] * scale
         found["status"][rows] = result["status"]
@@ -80,7 +80,7 @@ class _Block:
 
 
 def _solve_together(blocks, attempts):
-    """Solve blocks mesh by mesh; meshes with as many cells follow each other."""
+    """Solve blocks mesh by mesh; meshes with equal numbers of cells follow each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
     like, scaling = None, {}
@@ -92,27 +92,27 @@ def _solve_together(blocks, attempts):
 
 
 def _solve_mesh(block, box, rows, like, scaling, attempts):
-    """Solve the scenes of rows of a block that share a mesh; return the meshed sheet, or None."""
+    """Solve the rows of a block that share a mesh; return its cache, or None."""
 
     def attempt(name, function):
         return attempts.attempt(f"{block.file['name']} {rows[0]} {name}", function, _failed)
 
     # One network at a time: the next one takes over the symbolic factor.
     mesh_type = MESH_TYPES[block.file["mesh_type"]]
-    sheet = attempt(block.file["meshed"], lambda: MeshCache(mesh_type(*box), 1.0, networks=1, like=like))
-    if not isinstance(sheet, MeshCache):
-        for key in block.missing if sheet else ():
-            block.keep(key, rows, 1.0, sheet)
+    cache = attempt(block.file["meshed"], lambda: MeshCache(mesh_type(*box), 1.0, networks=1, like=like))
+    if not isinstance(cache, MeshCache):
+        for key in block.missing if cache else ():
+            block.keep(key, rows, 1.0, cache)
         return None
     for found in block.found.values():
-        found["particles"][rows] = len(sheet.mesh.points)
+        found["particles"][rows] = len(cache.mesh.points)
     drawn, ratios = block.drawn, block.drawn["poisson_ratio"][rows]
     # This force deforms a network of E t = 1 as the row's force deforms the row's.
     loads = drawn["force"][rows] / (drawn["young_modulus"][rows] * drawn["thickness"][rows])
     for key, scene in block.missing.items():
         definition = scene["definition"]
         if definition not in scaling:
-            objection = attempt(f"{key} scales", partial(_objection, sheet, scene, drawn, rows[0]))
+            objection = attempt(f"{key} scales", partial(_scaling_objection, cache, scene, drawn, rows[0]))
             # Without an answer the next mesh is tried.
             if isinstance(objection, str):
                 scaling[definition] = objection
@@ -121,25 +121,26 @@ def _solve_mesh(block, box, rows, like, scaling, attempts):
             continue
         for ratio in np.unique(ratios):
             alike = ratios == ratio
-            found = attempt(f"{key} {float(ratio)!r}", partial(_solved, sheet, scene, ratio, 1.0))
+            found = attempt(f"{key} {float(ratio)!r}", partial(_solve_network, cache, scene, ratio, 1.0))
             if found:
                 block.keep(key, rows[alike], loads[alike], found)
-    return sheet
+    return cache
 
 
 def _failed(why):
+    """Result of a scene that fails."""
     return {"displacement": np.nan, "status": Status.FAILED, "message": why}
 
 
-def _objection(sheet, scene, drawn, row):
-    """Return why results of a definition do not scale on a mesh, or an empty string; None without a result."""
+def _scaling_objection(cache, scene, drawn, row):
+    """Return why results of a definition do not scale, an empty string if they do, or None without a result."""
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
-    own, load = MeshCache(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
-    answers = [_solved(sheet, scene, ratio, load), _solved(own, scene, ratio, 1.0, modulus)]
+    own, load = MeshCache(cache.mesh, thickness, like=cache), 1.0 / (modulus * thickness)
+    answers = [_solve_network(cache, scene, ratio, load), _solve_network(own, scene, ratio, 1.0, modulus)]
     unit, answer = (one["displacement"] for one in answers)
     if not np.isfinite([unit, answer]).all():
         return None
-    if abs(unit - answer) <= SCALES * abs(answer):
+    if abs(unit - answer) <= SCALING_TOLERANCE * abs(answer):
         return ""
     return (
         f"{scene['definition']}: answers are not in proportion to force over Young's modulus and thickness, as those "
@@ -147,12 +148,12 @@ def _objection(sheet, scene, drawn, row):
     )
 
 
-def _solved(sheet, scene, ratio, load, modulus=1.0):
-    """Result of a network under a force; with the default modulus E t = 1, and the force is over E t [m]."""
+def _solve_network(cache, scene, ratio, load, modulus=1.0):
+    """Solve a network of E t = 1 under a force over E t [m], or of another modulus."""
     kind = LOAD_KINDS[scene["kind"]]
     try:
-        springs, _ = sheet.derive(scene["definition"], Material(modulus, float(ratio)))
+        springs, _ = cache.derive(scene["definition"], Material(modulus, float(ratio)))
     except DefinitionError as error:
         return _failed(f"{scene['definition']}: {error}")
-    found = sheet.solve(kind, springs, load, "linear")
+    found = cache.solve(kind, springs, load, "linear")
     return {"displacement": found.displacement, "status": found.status, "message": found.message}

@@ -18,7 +18,7 @@ EXPERIMENTS = {
     "buckling": "a slender column, a shallow arch",
 }
 
-ONCE = ("maps", "drift", "rest", "contrast", "sizes")
+DEFINITION_FREE = ("maps", "drift", "rest", "contrast", "sizes")
 """Experiments about schemes and numbers, not definitions: the first definition of a study stands for all."""
 
 AXES = {

@@ -21,7 +21,7 @@ STRAIN_LOADS = {"axial": "Force on the end", "follower-pressure": "Pressure that
 
 
 def stability(tree):
-    """Figures of the experiments that a dataset has."""
+    """Yield the figures of the experiments of a dataset."""
     done = group(tree, "stability").experiment.values
     for name, plot in {"maps": plot_stability_maps, "strains": plot_stability_strains}.items():
         if name in done:
@@ -29,7 +29,7 @@ def stability(tree):
 
 
 def _experiment(data, name):
-    """The group ``/stability`` of a dataset that has an experiment."""
+    """Return the group ``/stability``, or raise if it lacks an experiment."""
     data = group(data, "stability")
     done = data.experiment.values.tolist()
     if name not in done:
@@ -126,6 +126,7 @@ def plot_stability_strains(data, ax=None):
     strains = [f"{100 * strain:g}".replace("-", "−") for strain in data.strain.values]
 
     def text(flag, pivots, share, message):
+        """Text of a cell: negative pivots, reached load, flutter or an unstable path."""
         if pivots > 0 or share < 1:
             return f"{pivots:.0f}" if pivots > 0 else f"{100 * share:.0f} %"
         return ("f" if "flutters" in message else "path") if flag == 4 else ""

@@ -14,7 +14,7 @@ from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Stage, StudyKind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
-from . import AXES, EXPERIMENTS, ONCE
+from . import AXES, DEFINITION_FREE, EXPERIMENTS
 from .outputs import OUTPUTS, STABILITY_TABLES
 
 ExperimentName = Annotated[str, *one_of("experiment", EXPERIMENTS)]
@@ -64,7 +64,7 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
-    """Values of the experiments by name and definition: one a definition, or one in all."""
+    """Values of each experiment and definition; some experiments need only the first definition."""
     section = config.stability
     shared = {
         "beam": beam_key(declared.beams[section.beam]),
@@ -74,7 +74,7 @@ def _expand(config, declared):
         "mesh_sizes": sorted(section.mesh_size),
     }
     names = [name for name in EXPERIMENTS if name in section.experiment]
-    pairs = [(name, one) for name in names for one in section.definition[: 1 if name in ONCE else None]]
+    pairs = [(name, one) for name in names for one in section.definition[: 1 if name in DEFINITION_FREE else None]]
     return {pair: shared | dict(zip(("name", "definition"), pair)) for pair in pairs}
 
 
@@ -98,16 +98,16 @@ def _tasks(study):
 SCHEME = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
 SLIVER = ("definition", "sliver_angle")
 CONTRAST = ("stiffness_contrast",)
-STRESSED = ("definition", "stressed_poisson_ratio")
-STRAINED = ("definition", "strain_load", "strain")
-PERTURBED = ("definition", "perturbation")
+POISSON = ("definition", "stressed_poisson_ratio")
+STRAIN = ("definition", "strain_load", "strain")
+PERTURBATION = ("definition", "perturbation")
 ARCH = ("definition", "arch_point")
-SLENDER = ("definition", "rows")
-OF_DEFINITION = ("definition",)
+COLUMN = ("definition", "rows")
+DEFINITION = ("definition",)
 
 
-def _judged(name, dimensions, long_name):
-    """Variables that say what became of solves."""
+def _status_variables(name, dimensions, long_name):
+    """Status and message of an experiment."""
     return {
         f"{name}_status": (dimensions, "1", f"what became of {long_name}", 0),
         f"{name}_message": (dimensions, "1", f"why it is not solved: {long_name}", ""),
@@ -140,33 +140,33 @@ EXPERIMENT_VARIABLES = {
     ),
     "relaxation_error": (("mesh_size",), "1", "distance of dynamic relaxation from the static solution", nan),
     "relaxation_steps": (("mesh_size",), "1", "steps of dynamic relaxation", nan),
-    **_judged("sliver", SLIVER, "a mesh with a sliver"),
+    **_status_variables("sliver", SLIVER, "a mesh with a sliver"),
     "sliver_negative_pivots": (SLIVER, "1", "negative pivots of the tangent with a sliver", nan),
     "sliver_step_limit": (SLIVER, "s", "largest stable step with a sliver", nan),
     "sliver_error": (SLIVER, "1", "displacement with a sliver over that without, less 1", nan),
-    **_judged("contrast", CONTRAST, "a network with stiff and soft parts"),
+    **_status_variables("contrast", CONTRAST, "a network with stiff and soft parts"),
     "contrast_negative_pivots": (CONTRAST, "1", "negative pivots of the tangent with a contrast", nan),
     "contrast_error": (CONTRAST, "1", "error of the linear solution, against extended precision", nan),
     "contrast_estimate": (CONTRAST, "1", "its estimate, by which it is judged", nan),
-    **_judged("poisson", STRESSED, "a material near the incompressible one"),
-    "poisson_negative_pivots": (STRESSED, "1", "negative pivots of the tangent", nan),
-    "poisson_modulus_error": (STRESSED, "1", "error of Young's modulus along x", nan),
-    "poisson_step_limit": (STRESSED, "s", "largest stable step", nan),
+    **_status_variables("poisson", POISSON, "a material near the incompressible one"),
+    "poisson_negative_pivots": (POISSON, "1", "negative pivots of the tangent", nan),
+    "poisson_modulus_error": (POISSON, "1", "error of Young's modulus along x", nan),
+    "poisson_step_limit": (POISSON, "s", "largest stable step", nan),
     "scaled_step_limit": (("scale",), "s/m", "largest stable step over the mesh size", nan),
     "precision_error": (("scale", "precision"), "1", "error of a run to rest, against the static solution", nan),
-    **_judged("strain", STRAINED, "a large strain"),
-    "negative_pivots": (STRAINED, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", nan),
-    "strain_displacement": (STRAINED, "m", "mean displacement of the loaded side along the force", nan),
-    "strain_load_share": (STRAINED, "1", "largest share of the load with a good equilibrium", nan),
-    **_judged("perturbed", PERTURBED, "a mesh with particles moved"),
-    "perturbed_negative_pivots": (PERTURBED, "1", "negative pivots of the tangent", nan),
-    "perturbed_error": (PERTURBED, "1", "displacement with particles moved over that without, less 1", nan),
-    "perturbed_step_limit": (PERTURBED, "s", "largest stable step with particles moved", nan),
-    "inverted_starts_right": (OF_DEFINITION, "1", "share of inverted starts that end in the right solution", nan),
-    "inverted_starts_wrong": (OF_DEFINITION, "1", "share of inverted starts that end as solved elsewhere", nan),
-    "buckling_load": (SLENDER, "N", "buckling load of a column twenty times as long as high", nan),
-    "buckling_message": (SLENDER, "1", "what restricts the buckling load, or why there is none", ""),
-    "euler_load": (OF_DEFINITION, "N", "its load by Euler", nan),
+    **_status_variables("strain", STRAIN, "a large strain"),
+    "negative_pivots": (STRAIN, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", nan),
+    "strain_displacement": (STRAIN, "m", "mean displacement of the loaded side along the force", nan),
+    "strain_load_share": (STRAIN, "1", "largest share of the load with a good equilibrium", nan),
+    **_status_variables("perturbed", PERTURBATION, "a mesh with particles moved"),
+    "perturbed_negative_pivots": (PERTURBATION, "1", "negative pivots of the tangent", nan),
+    "perturbed_error": (PERTURBATION, "1", "displacement with particles moved over that without, less 1", nan),
+    "perturbed_step_limit": (PERTURBATION, "s", "largest stable step with particles moved", nan),
+    "inverted_starts_right": (DEFINITION, "1", "share of inverted starts that end in the right solution", nan),
+    "inverted_starts_wrong": (DEFINITION, "1", "share of inverted starts that end as solved elsewhere", nan),
+    "buckling_load": (COLUMN, "N", "buckling load of a column twenty times as long as high", nan),
+    "buckling_message": (COLUMN, "1", "what restricts the buckling load, or why there is none", ""),
+    "euler_load": (DEFINITION, "N", "its load by Euler", nan),
     "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", nan),
     "arch_deflection": (ARCH, "m", "its deflection", nan),
     "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", nan),

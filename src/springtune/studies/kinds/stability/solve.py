@@ -36,18 +36,18 @@ GROWTH_STEPS = 2000
 
 
 def failed(task, why):
-    """Result of an experiment that fails."""
+    """Result of an experiment that failed."""
     return {"experiment_seconds": np.nan, "experiment_message": why}
 
 
 def solve(task):
-    """Result of an experiment."""
+    """Run an experiment."""
     made = {"beam": Beam(**task["beam"]), "material": material_of(task["material"]).in_plane}
     setup = Setup(**{name: value for name, value in task.items() if name not in ("key", "name")} | made)
     begin = time.perf_counter()
     rows = [
         {name: value.item() if isinstance(value, np.generic) else value for name, value in row.items()}
-        for row in RUN[task["name"]](setup)
+        for row in EXPERIMENT_FUNCTIONS[task["name"]](setup)
     ]
     return {"rows": [*rows, {"experiment_seconds": time.perf_counter() - begin, "experiment_message": ""}]}
 
@@ -65,7 +65,7 @@ class Setup:
 
     @cached_property
     def coarse(self):
-        """The coarsest of the meshes: most experiments need no finer one."""
+        """Coarsest mesh, which most experiments use."""
         return self.mesh(self.mesh_sizes[-1])
 
     def mesh(self, size):
@@ -74,20 +74,20 @@ class Setup:
 
     def springs(self, mesh):
         """Springs of the definition."""
-        return self.sheet(mesh).derive(self.definition, self.material)[0]
+        return self.cache(mesh).derive(self.definition, self.material)[0]
 
-    def plain_springs(self, mesh):
-        """As `springs`, without forces that the definition adds to a load: experiments are on the network itself."""
+    def springs_without_load(self, mesh):
+        """Springs without the forces that the definition adds to a load."""
         return replace(self.springs(mesh), lateral=0.0)
 
-    def sheet(self, mesh):
+    def cache(self, mesh):
         """Cache of a mesh."""
-        return _sheet(mesh, self.beam.thickness)
+        return _mesh_cache(mesh, self.beam.thickness)
 
     def problem(self, mesh, kind=AXIAL, follower=False):
         """Static problem and its reference stiffness."""
-        springs = self.plain_springs(mesh)
-        return self.sheet(mesh).problem(kind, springs, follower), springs.reference
+        springs = self.springs_without_load(mesh)
+        return self.cache(mesh).problem(kind, springs, follower), springs.reference
 
     def loaded(self, mesh):
         """Static problem of the traction, and its load over the reference stiffness."""
@@ -95,29 +95,32 @@ class Setup:
         return problem, self.force / reference
 
     def motion(self, mesh, **options):
-        """The beam under its force, free of damping."""
+        """Undamped motion of the beam under its force."""
         options = {"linear": True} | options
         return motion_of(
-            self.sheet(mesh), AXIAL, self.plain_springs(mesh), self.material.density, self.force, **options
+            self.cache(mesh), AXIAL, self.springs_without_load(mesh), self.material.density, self.force, **options
         )
 
 
 @lru_cache(maxsize=1)
-def _sheet(mesh, thickness):
+def _mesh_cache(mesh, thickness):
+    """Cache of the last mesh."""
     return MeshCache(mesh, thickness)
 
 
-def changed(motion, **options):
-    """A motion with some of its parameters changed."""
+def modified(motion, **options):
+    """Copy a motion with other parameters."""
     kept = {"load": motion.load, "mass_damping": motion.mass_damping, "dampers": motion.dampers}
     return Motion(motion.network, motion.inertia[:, 0], **(kept | {"linear": motion.linear} | options))
 
 
 def _displacement(found, pattern):
+    """Mean displacement of a solution over a pattern of weights."""
     return float(np.tensordot(found.displacements, pattern, axes=2))
 
 
 def _noise(motion, size=1e-6, seed=0):
+    """Random displacements of the free particles."""
     random = np.random.default_rng(seed).standard_normal(motion.network.held.shape)
     return size * random * ~motion.network.held
 
@@ -126,12 +129,12 @@ def _noise(motion, size=1e-6, seed=0):
 
 
 def limits(setup):
-    """Largest stable step of every explicit scheme, predicted and measured, over mesh sizes and damping."""
+    """Largest stable step of every explicit scheme, predicted and measured, by mesh size and damping."""
     for size in setup.mesh_sizes:
         motion = setup.motion(setup.mesh(size), load=None)
         yield {"mesh_size": size, "omega_max": motion.omega_max, "dt_particle_bound": 2 / motion.particle_bound}
         for integrator, damper, ratio in product(EXPLICIT, AXES["damper"], AXES["damping_ratio"]):
-            damped = changed(motion, **_damping(motion, damper, ratio))
+            damped = modified(motion, **_damping(motion, damper, ratio))
             yield {
                 "mesh_size": size,
                 "integrator": integrator,
@@ -143,7 +146,7 @@ def limits(setup):
 
 
 def _damping(motion, kind, ratio):
-    """Damping with a ratio in the highest mode, roughly where it is of springs."""
+    """Damping with a ratio in the highest mode; approximate for dampers along springs."""
     if kind == "mass":
         return {"mass_damping": 2 * ratio * motion.omega_max}
     stiffness = np.abs(motion.network.stiffness)
@@ -152,9 +155,10 @@ def _damping(motion, kind, ratio):
 
 
 def measured_limit(motion, integrator, resolution=2e-3):
-    """Largest step that does not grow noise [s], by bisection of runs; about rest, linear."""
+    """Measure the largest step that does not amplify noise [s], by bisection of linear runs about rest."""
 
     def grows(step):
+        """Return whether a run with a step amplifies noise."""
         start = _noise(motion)
         half = motion.run(integrator, step, GROWTH_STEPS // 2, start)
         if half.status == "diverged":
@@ -179,10 +183,10 @@ def measured_limit(motion, integrator, resolution=2e-3):
 
 
 def maps(setup):
-    """What noise becomes over step and damping, in every scheme."""
+    """Behaviour of noise by step and damping, in every scheme."""
     motion = setup.motion(setup.coarse, load=None)
     for integrator, ratio in product(INTEGRATORS, AXES["map_damping_ratio"]):
-        damped, labels = changed(motion, mass_damping=2 * ratio * motion.omega_max), {"map_damping_ratio": ratio}
+        damped, labels = modified(motion, mass_damping=2 * ratio * motion.omega_max), {"map_damping_ratio": ratio}
         predicted = min(damped.step_limit(integrator) * motion.omega_max / 2, 1e3)
         yield labels | {"integrator": integrator, "step_ratio_predicted": predicted}
         for step in AXES["step_ratio"]:
@@ -191,6 +195,7 @@ def maps(setup):
 
 
 def _behaviour(motion, integrator, step):
+    """Flag of the behaviour of noise in a run."""
     start = _noise(motion)
     count = 400 if integrator in EXPLICIT else 60
     found = motion.run(integrator, step, count, start)
@@ -202,15 +207,15 @@ def _behaviour(motion, integrator, step):
 
 
 def drift(setup):
-    """Energy of the undamped beam let go from a stretch, and momentum of one that floats, over many steps."""
+    """Energy of an undamped vibration and momentum of a floating beam over many steps."""
     motion = setup.motion(setup.coarse, linear=False)
     if motion.network.energies:  # not compiled, and the same schemes
-        motion = changed(motion, linear=True)
+        motion = modified(motion, linear=True)
     problem, _ = setup.problem(setup.coarse)
     pulled = (problem.linear if motion.linear else problem.nonlinear)(motion.load.sum()).displacements
-    free = changed(motion, load=np.zeros_like(motion.load))
+    free = modified(motion, load=np.zeros_like(motion.load))
     step = 0.5 * free.step_limit("central-difference")
-    unheld = setup.sheet(setup.coarse).network(np.zeros_like(motion.network.held), setup.springs(setup.coarse))
+    unheld = setup.cache(setup.coarse).network(np.zeros_like(motion.network.held), setup.springs(setup.coarse))
     floating = Motion(unheld, motion.inertia[:, 0], linear=motion.linear)
     kick = np.random.default_rng(1).standard_normal(motion.load.shape)
     for integrator in INTEGRATORS:
@@ -230,13 +235,13 @@ def drift(setup):
 
 
 def rest(setup):
-    """Steps to rest over damping; and how far a truncated solver of backward Euler stops from the answer."""
+    """Steps to rest by damping, and errors of backward Euler with a truncated linear solver."""
     motion = setup.motion(setup.coarse)
     omega = motion.loaded_frequency
     step = 0.9 * motion.step_limit("central-difference")
     yield {"loaded_frequency": omega}
     for ratio in AXES["critical_ratio"]:
-        found = changed(motion, mass_damping=2 * ratio * omega).run("central-difference", step, 100_000, rest=1e-3)
+        found = modified(motion, mass_damping=2 * ratio * omega).run("central-difference", step, 100_000, rest=1e-3)
         yield {"critical_ratio": ratio, "steps_to_rest": found.steps if found.status == "rest" else np.nan}
     for size in setup.mesh_sizes:
         mesh = setup.mesh(size)
@@ -255,14 +260,16 @@ def rest(setup):
 
 
 @contextmanager
-def _judging(name, **labels):
-    """Row of an equilibrium, and a function that judges it and returns whether it is good; errors go into the row."""
+def _judged_row(name, **labels):
+    """Yield a row for status and message of an equilibrium, and its judge; exceptions go into the row."""
 
     def note(status, message, pivots=np.nan):
+        """Write status, message and negative pivots into the row."""
         values = {"status": int(status), "message": message, "negative_pivots": pivots}
         labels.update({f"{name}_{key}": value for key, value in values.items()})
 
     def judge(problem, s, solution):
+        """Judge a solution, and return whether it is an equilibrium."""
         status, *others = problem.judge(s, solution)
         note(status, *others)
         return status in (Status.SOLVED, Status.UNSTABLE)
@@ -279,7 +286,7 @@ def _judging(name, **labels):
 
 
 def slivers(setup):
-    """Step and answer of a mesh with one particle drawn towards an opposite side, down to angles of half a degree."""
+    """Step limit and error with one particle moved towards the opposite side, down to angles of half a degree."""
     mesh, pattern = setup.coarse, weights(setup.coarse, AXIAL)
     whole, s = setup.loaded(mesh)
     answer = _displacement(whole.linear(s), pattern)
@@ -295,7 +302,7 @@ def slivers(setup):
         points[moved] = middle + away / np.linalg.norm(away) * 0.5 * side * np.tan(np.radians(angle))
         drawn = Mesh(points, mesh.triangles)
         assert np.degrees(corner_angles(points, drawn.triangles).min()) <= angle * (1 + 1e-9)
-        with _judging("sliver", sliver_angle=angle) as (row, judge):
+        with _judged_row("sliver", sliver_angle=angle) as (row, judge):
             problem, s = setup.loaded(drawn)
             row["sliver_step_limit"] = setup.motion(drawn).step_limit("central-difference")
             if judge(problem, s, solution := problem.linear(s)):
@@ -303,35 +310,35 @@ def slivers(setup):
         yield row
 
 
-MOST_LOST = 1e-2
+MOST_ROUNDING_LOSS = 1e-2
 """Largest share of the digits that rounding may take from a factor: beyond, another solver or processor may leave none,
 neither of the estimate. The condition of a sheet's network is about its number of particles times the contrast."""
 
 
 def contrast(setup):
-    """Error of the linear solution where every other part of the beam is stiffer, against extended precision."""
+    """Error of the linear solution with alternating stiff and soft parts, against extended precision."""
     whole, reference = setup.problem(setup.coarse)
     network, s = whole.network, setup.force / reference
     middle = setup.coarse.points[setup.coarse.edges].mean(axis=1)[:, 0]
     soft = (middle / setup.beam.height + 1e-9) // 1 % 2 == 0  # what lies between two parts is the right one's
-    sure = MOST_LOST / (np.finfo(float).eps * len(setup.coarse.points))
+    sure = MOST_ROUNDING_LOSS / (np.finfo(float).eps * len(setup.coarse.points))
     base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
     for ratio in AXES["stiffness_contrast"]:
         stiffer = Springs(reference, base * np.where(soft, 1.0, ratio))
-        problem = setup.sheet(setup.coarse).problem(AXIAL, stiffer)
+        problem = setup.cache(setup.coarse).problem(AXIAL, stiffer)
         solution = problem.linear(s)
-        with _judging("contrast", stiffness_contrast=ratio) as (row, judge):
+        with _judged_row("contrast", stiffness_contrast=ratio) as (row, judge):
             judge(problem, s, solution)
         if ratio > sure:  # the same status and message on every processor
             why = f"ill-conditioned: rounding may leave no digit beyond a contrast of {sure:.0e}"
             row |= {"contrast_status": int(Status.NOT_CONVERGED), "contrast_message": why}
             row["contrast_negative_pivots"] = np.nan
-        exact = _refined(problem, s, solution.displacements)
+        exact = _refined_solution(problem, s, solution.displacements)
         error = float(np.abs(solution.displacements - exact).max() / np.abs(exact).max())
         yield row | {"contrast_error": error, "contrast_estimate": solution.error_estimate}
 
 
-def _refined(problem, s, displacements):
+def _refined_solution(problem, s, displacements):
     """Linear solution by iterative refinement, residuals spring by spring in extended precision.
 
     The assembled matrix would not do: its entries are rounded, and if ill-conditioned it is another network's.
@@ -356,7 +363,7 @@ def poisson(setup):
     for ratio in AXES["stressed_poisson_ratio"]:
         # Of the modulus and density alone: rubber of a test has no other ratio than its own.
         one = replace(setup, material=Material(given.young_modulus, ratio, given.density, given.name))
-        with _judging("poisson", stressed_poisson_ratio=ratio) as (row, judge):
+        with _judged_row("poisson", stressed_poisson_ratio=ratio) as (row, judge):
             problem, s = one.loaded(one.coarse)
             row["poisson_step_limit"] = one.motion(one.coarse).step_limit("central-difference")
             springs, membrane = one.springs(one.coarse), one.material.young_modulus * one.beam.thickness
@@ -366,14 +373,14 @@ def poisson(setup):
 
 
 def sizes(setup):
-    """The same beam from micrometres to centimetres of mesh size, in double and single precision."""
+    """Step limit and error of the same beam scaled over four decades, in double and single precision."""
     for size in AXES["scale"]:
         ratio = size / setup.mesh_sizes[-1]
         sides = {name: getattr(setup.beam, name) * ratio for name in ("length", "height", "thickness")}
         beam = replace(setup.beam, **sides)
         one = replace(setup, beam=beam, force=setup.force * ratio**2, mesh_sizes=(size,))
         motion = one.motion(one.coarse, linear=False)
-        motion = changed(motion, mass_damping=motion.loaded_frequency)
+        motion = modified(motion, mass_damping=motion.loaded_frequency)
         static = one.problem(one.coarse)[0].nonlinear(motion.load.sum()).displacements
         limit = motion.step_limit("central-difference") / size
         yield {"scale": size, "scaled_step_limit": limit}
@@ -387,13 +394,13 @@ def sizes(setup):
 
 
 def strains(setup):
-    """Nonlinear equilibria under loads that would strain a linear beam by up to 300 %."""
+    """Nonlinear equilibria under loads that strain a linear beam by up to 300 %."""
     mesh, membrane = setup.coarse, setup.material.young_modulus * setup.beam.thickness
     for load in AXES["strain_load"]:
         kind, side = (AXIAL, setup.beam.height) if load == "axial" else (FACE, setup.beam.length)
         pattern = weights(mesh, kind)
         for strain in AXES["strain"]:
-            with _judging("strain", strain_load=load, strain=strain) as (row, judge):
+            with _judged_row("strain", strain_load=load, strain=strain) as (row, judge):
                 problem, reference = setup.problem(mesh, kind, load != "axial")
                 s = strain * membrane * side / reference
                 solution = problem.nonlinear(s)
@@ -405,7 +412,7 @@ def strains(setup):
 
 
 def perturbation(setup):
-    """Answers of meshes whose inner particles are moved at random, and Newton's method from inverted starts."""
+    """Errors with inner particles moved at random, and Newton's method from inverted starts."""
     mesh, size = setup.coarse, setup.mesh_sizes[-1]
     pattern = weights(mesh, AXIAL)
     random = np.random.default_rng(0).uniform(-1, 1, mesh.points.shape)
@@ -415,7 +422,7 @@ def perturbation(setup):
     answer = _displacement(whole, pattern) if whole.converged else np.nan
     for share in AXES["perturbation"]:
         points = mesh.points + share * size * random
-        with _judging("perturbed", perturbation=share) as (row, judge):
+        with _judged_row("perturbed", perturbation=share) as (row, judge):
             if mesh.inverted(points):
                 raise DefinitionError("triangles of the mesh are inverted; move its particles less")
             moved = Mesh(points, mesh.triangles)
@@ -435,7 +442,7 @@ def perturbation(setup):
 
 
 def buckling(setup):
-    """Buckling load of a slender column, ten and twenty rows high, over Euler's; the path of a shallow arch."""
+    """Buckling load of a slender column of ten and twenty rows, Euler's load, and the path of a shallow arch."""
     height = 0.05 * setup.beam.length
     euler = np.pi**2 * setup.material.young_modulus * setup.beam.thickness * height**3 / 12
     euler /= 4 * setup.beam.length**2
@@ -453,7 +460,7 @@ def buckling(setup):
 
 
 def _arch(setup):
-    """Rows of the path of a shallow arch, clamped at both ends and pushed down in its middle: it snaps."""
+    """Yield the path of a shallow arch, clamped at both ends and pushed down in its middle, which snaps through."""
     length, height = setup.beam.length, 0.01 * setup.beam.length
     flat = MESH_TYPES[setup.mesh_type](length, height, 0.4 * height)
     rise = 0.04 * length
@@ -471,7 +478,7 @@ def _arch(setup):
         springs = setup.springs(mesh)
     except DefinitionError:
         return
-    network = setup.sheet(mesh).network(directions, springs)
+    network = setup.cache(mesh).network(directions, springs)
     inertia = setup.material.young_modulus * setup.beam.thickness * height**3
     s = -40 * inertia * rise / length**3 / springs.reference
     problem = StaticProblem(network, pattern)
@@ -482,7 +489,7 @@ def _arch(setup):
     yield from (dict(zip(names, values)) for values in zip(AXES["arch_point"], *found))
 
 
-RUN = {
+EXPERIMENT_FUNCTIONS = {
     one.__name__: one
     for one in (limits, maps, drift, rest, slivers, contrast, poisson, sizes, strains, perturbation, buckling)
 }
