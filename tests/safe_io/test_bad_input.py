@@ -427,7 +427,7 @@ class TestDatasets:
         monkeypatch.chdir(path.parent)
         shutil.copy(path, path.with_name("other.nc"))
         self.links(name, path)
-        says = rf"dataset.nc: 'deformation_error' is {name}[^;]*; data of other files are not read"
+        says = rf"dataset.nc: 'deformation_error' is {name}[^;]*; links and other files are not followed"
         for call in (st.open, page):
             with pytest.raises(ValueError, match=says):
                 call(path)
@@ -454,7 +454,9 @@ class TestDatasets:
         with h5py.File(mesh, "r+") as file:
             file["elsewhere"] = h5py.SoftLink("/ENS_MAA")
             del file[name]
-        with pytest.raises(MeshError, match="'elsewhere' is a soft link; it is not followed: write the array"):
+        with pytest.raises(
+            MeshError, match="'elsewhere' is a soft link; links and other files are not followed: write the array"
+        ):
             read_beam_mesh(mesh, 0.1, 0.02)
 
     @pytest.mark.parametrize(

@@ -8,15 +8,10 @@ import os
 import re
 import signal
 import stat
-import struct
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import h5py
 
 LARGEST_CSV = 5_000_000
 """Bytes of the largest CSV file that is read."""
@@ -204,83 +199,28 @@ def _timed(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGVTALRM, before)
 
 
-MOST_OBJECTS = 20_000
-"""Most groups and arrays of an HDF5 file."""
-
-DEEPEST_GROUP = 16
-"""Most groups of an HDF5 file within each other."""
-
-SOFT_LINK = "a soft link"
-
-HEAP = b"GCOL\x01\0\0\0"
-"""Start of a heap of texts and links in an HDF5 file."""
-
-OBJECT = struct.Struct("<H6xQ")
-"""Head of an object of a heap: its number, 0 for free space, and its bytes."""
-
-HEAPS_SEARCHED = 2**28
-"""Bytes of a file that are searched for heaps, from its start."""
-
-
 def check_alone(path: str | Path) -> None:
-    """Refuse an HDF5 file whose data are in other files, or whose groups are no tree of limited size."""
-    import h5py
+    """Refuse an HDF5 file with data that are in other files or behind links."""
+    import h5py  # here: few commands read such files
 
-    found: list[tuple[bytes, int]] = []
-    names: dict[str, str] = {}
+    elsewhere: dict[str, str] = {}
 
-    def note(name: bytes, info: "h5py.h5l.LinkInfo") -> bool:
-        found.append((name, info.type))
-        return len(found) > MOST_OBJECTS or name.count(b"/") > DEEPEST_GROUP
+    def look(name: str, link: object) -> None:
+        if isinstance(link, h5py.SoftLink):
+            elsewhere[name] = "a soft link"
+        elif isinstance(link, h5py.ExternalLink):
+            elsewhere[name] = "an external link"
+        elif isinstance(array := file[name], h5py.Dataset) and array.external:
+            elsewhere[name] = f"stored outside of the file, in {array.external[0][0]!r}"
+        elif isinstance(array, h5py.Dataset) and array.is_virtual:
+            elsewhere[name] = "a virtual dataset"
 
     try:
         with h5py.File(path) as file:
-            if file.id.get_create_plist().get_sizes() == (8, 8):
-                _check_heaps(path)
-            root = file["/"].id
-            root.links.visit(note, info=True)  # what is raised within is not always passed on
-            if len(found) > MOST_OBJECTS:
-                raise ValueError(f"it has over {MOST_OBJECTS:,} groups and arrays")
-            seen = {h5py.h5o.get_info(root).addr}
-            for name, kind in found:
-                shown = name.decode(errors="replace")
-                if kind != h5py.h5l.TYPE_HARD:
-                    names[shown] = SOFT_LINK if kind == h5py.h5l.TYPE_SOFT else "an external link"
-                    continue
-                if name.count(b"/") > DEEPEST_GROUP:
-                    raise ValueError(f"{shown[:40]!r} is more than {DEEPEST_GROUP} groups deep")
-                one = h5py.h5o.open(root, name)
-                address = h5py.h5o.get_info(one).addr
-                if address in seen:
-                    raise ValueError(f"{shown!r} is linked twice, or in a circle")
-                seen.add(address)
-                if isinstance(one, h5py.h5d.DatasetID):
-                    stored = one.get_create_plist()
-                    if stored.get_external_count():
-                        outside = stored.get_external(0)[0].decode(errors="replace")
-                        names[shown] = f"stored outside of the file, in {outside!r}"
-                    if stored.get_layout() == h5py.h5d.VIRTUAL:
-                        names[shown] = "a virtual dataset"
+            file.visititems_links(look)
     except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
         raise OSError(f"damaged: {error}") from None
-    for place, what in names.items():
-        why = "it is not followed: write the array in its place"
-        if what != SOFT_LINK:
-            why = "data of other files are not read: write them into this one"
-        raise DataElsewhere(f"{path}: {place!r} is {what}; {why}")
-
-
-def _check_heaps(path: str | Path) -> None:
-    """Refuse heaps whose objects do not fill them: HDF5 may never come to the end of one."""
-    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        most = min(len(data), HEAPS_SEARCHED)
-        start = data.find(HEAP, 0, most)
-        while start >= 0:
-            at, end = start + 16, start + int.from_bytes(data[start + 8 : start + 16], "little")
-            while at + 16 <= min(end, most):
-                index, size = OBJECT.unpack_from(data, at)
-                step = 16 + -(-size // 8) * 8 if index else size
-                if not 16 <= step <= end - at:
-                    raise ValueError(f"the heap at byte {start} has an object of {size} bytes at byte {at}")
-                at += step
-            start = data.find(HEAP, start + 1, most)
+    for name, what in elsewhere.items():
+        raise DataElsewhere(
+            f"{path}: {name!r} is {what}; links and other files are not followed: write the array in its place"
+        )

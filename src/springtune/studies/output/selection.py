@@ -115,12 +115,6 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     return found.reset_coords([name for name in chosen if name in found.coords])
 
 
-def in_plane_ratio(root: xr.Dataset) -> xr.DataArray:
-    """Poisson's ratio of each material in its plane, see `springtune.Material.in_plane`."""
-    ratio = root.material_poisson_ratio
-    return ratio.where(root.material_plane != "strain", ratio / (1 - ratio)) if "material_plane" in root else ratio
-
-
 def sign_of_errors(data: xr.Dataset) -> str:
     """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
     if "reference_displacement" not in data:
