@@ -2,25 +2,23 @@
 
 import os
 import shutil
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import h5py
 import numpy as np
 import pandas as pd
 import xarray as xr
-from xarray.backends import BackendArray
+from xarray.backends import H5NetCDFStore
 from xarray.conventions import cf_encoder, encode_dataset_coordinates
-from xarray.core import indexing
 
 from springtune.problem.parameters import SWEPT
 from springtune.problem.status import Status
 from springtune.safe_io.atomic import replacing
-
-from . import netcdf
 
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
@@ -170,13 +168,11 @@ TEXTS_IN_CHUNK = 128
 def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
     """Write a dataset atomically."""
     tree, content = xr.DataTree.from_dict(groups), BytesIO()  # whole, so that HDF5 meets no full disk
-    with h5py.File(content, "w", track_order=True) as file:
-        shared: dict[str, h5py.Dataset] = {}
+    tree.attrs = dict(attributes)
+    with h5netcdf.File(content, "w") as file:
         for node in tree.subtree:
-            group = file.create_group(node.path, track_order=True) if node.parent else file
-            written = _write_group(group, node.to_dataset(False), shared)
-            shared = shared if node.parent else written
-        netcdf.add_attributes(file, dict(attributes))
+            above = node.parent.sizes if node.parent else {}  # what groups share with the root is written there
+            _write_group(file.create_group(node.path) if node.parent else file, node.to_dataset(False), above)
     path = Path(path)
     try:
         with replacing(path, synced=True) as unfinished:
@@ -189,8 +185,8 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
         ) from None
 
 
-def _write_group(group: h5py.Group, data: xr.Dataset, shared: dict[str, h5py.Dataset]) -> dict[str, h5py.Dataset]:
-    """Write the variables of a group, encoded by the conventions; return its dimensions with the `shared` ones."""
+def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashable, int]) -> None:
+    """Write the variables of a group, encoded by the conventions; of large sparse texts only the chunks with a text."""
     variables, attributes = encode_dataset_coordinates(data)
     for name, array in variables.items():
         if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
@@ -198,36 +194,26 @@ def _write_group(group: h5py.Group, data: xr.Dataset, shared: dict[str, h5py.Dat
         elif name in data.coords:
             array.encoding = {"_FillValue": None}  # CF: coordinates have no holes
     variables, attributes = cf_encoder(variables, attributes)
-    netcdf.add_attributes(group, attributes)
-    written = {name: _write_array(group, str(name), array) for name, array in variables.items()}
-    own = {str(name): size for name, size in data.sizes.items() if name not in shared or len(shared[name]) != size}
-    scales = shared | {name: netcdf.add_dimension(group, name, size) for name, size in own.items()}
+    group.attrs.update(attributes)
+    group.dimensions = {dim: size for dim, size in data.sizes.items() if above.get(dim) != size}
     for name, array in variables.items():
-        for axis, dimension in enumerate(array.dims if array.dims != (name,) else ()):
-            written[name].dims[axis].attach_scale(scales[str(dimension)])
-    return scales
-
-
-def _write_array(group: h5py.Group, name: str, array: xr.Variable) -> h5py.Dataset:
-    """Write an array; of large texts that are mostly empty only the chunks with a text."""
-    values, fill = array.values, array.attrs.get("_FillValue")
-    texts = values.dtype.kind in "OU"
-    sparse = texts and values.nbytes > CHUNK and np.mean(values == "") > MOSTLY_EMPTY
-    options: dict[str, Any] = {}
-    if sparse:
-        options = {"chunks": _chunk(array.shape, TEXTS_IN_CHUNK)}
-    elif not texts and values.nbytes > UNCOMPRESSED:
-        options = {"chunks": _chunk(array.shape, CHUNK // values.itemsize), "compression": "gzip", "shuffle": True}
-    dtype = h5py.string_dtype() if texts else values.dtype
-    stored = group.create_dataset(name, array.shape, dtype, fillvalue=fill, **options)
-    netcdf.add_attributes(stored, array.attrs)
-    if not sparse:
-        stored[...] = values
-        return stored
-    for cells in stored.iter_chunks():
-        if (values[cells] != "").any():
+        fill, values = array.attrs.pop("_FillValue", None), array.values
+        texts = values.dtype.kind in "OU"
+        sparse = texts and values.nbytes > CHUNK and np.mean(values == "") > MOSTLY_EMPTY
+        options: dict[str, Any] = {}
+        if sparse:
+            options = {"chunks": _chunk(array.shape, TEXTS_IN_CHUNK)}
+        elif not texts and values.nbytes > UNCOMPRESSED:
+            options = {"chunks": _chunk(array.shape, CHUNK // values.itemsize), "compression": "gzip", "shuffle": True}
+        dtype = h5py.string_dtype() if texts else values.dtype
+        stored = group.create_variable(name, array.dims, dtype, fillvalue=fill, **options)
+        stored.attrs.update(array.attrs)
+        if not sparse:
+            stored[...] = values
+            continue
+        for start in np.unique(np.argwhere(values != "") // options["chunks"], axis=0).tolist():
+            cells = tuple(slice(n * size, (n + 1) * size) for n, size in zip(start, options["chunks"]))
             stored[cells] = values[cells]
-    return stored
 
 
 def _chunk(shape: Sequence[int], cells: int) -> tuple[int, ...]:
@@ -243,33 +229,15 @@ LARGE_ARRAY = 2**20
 """Larger arrays, in bytes, are read on demand."""
 
 
-class _OnDemand(BackendArray):
-    """Array of an open file of which xarray reads what is asked for."""
-
-    def __init__(self, stored: netcdf.Stored) -> None:
-        self.stored, self.shape, self.dtype = stored, stored.array.shape, stored.array.dtype
-
-    def __getitem__(self, key: indexing.ExplicitIndexer) -> np.ndarray:
-        support = indexing.IndexingSupport.OUTER_1VECTOR
-        values: np.ndarray = indexing.explicit_indexing_adapter(key, self.shape, support, self.stored.read)
-        return values
-
-    def __deepcopy__(self, memo: object) -> "_OnDemand":
-        return self  # nothing writes to it
-
-
-def tree(file: h5py.File) -> xr.DataTree:
+def tree(file: h5netcdf.File) -> xr.DataTree:
     """Dataset of an open file: small arrays in memory, large ones read on demand."""
     groups = {}
-    for group in (file, *(one for one in file.values() if isinstance(one, h5py.Group))):
-        arrays = {}
-        for name, stored in netcdf.variables(group).items():
-            large = stored.array.nbytes > LARGE_ARRAY
-            values = indexing.LazilyIndexedArray(_OnDemand(stored)) if large else stored.read()
-            if isinstance(values, np.ndarray) and values.dtype == object:
-                values = values.astype(str)
-            arrays[name] = xr.Variable(stored.dims, values, stored.attributes)
-        data = xr.decode_cf(xr.Dataset(arrays, attrs=netcdf.attributes_of(group)))
+    for group in (file, *file.groups.values()):
+        variables, attributes = H5NetCDFStore(group).load()  # type: ignore[no-untyped-call]
+        for array in variables.values():
+            if array.dtype == object and array.nbytes > LARGE_ARRAY:
+                del array.encoding["dtype"]  # by which xarray would read texts at the width of the longest one
+        data = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
         for one in data.variables.values():
             if one.nbytes <= LARGE_ARRAY:
                 one.load()

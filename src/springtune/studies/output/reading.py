@@ -11,7 +11,7 @@ from springtune.safe_io.escapes import clipped
 from springtune.safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone
 
 if TYPE_CHECKING:
-    import h5py
+    import h5netcdf
     import xarray
 
     from .dataset import Label
@@ -69,23 +69,21 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str]) -> "Iterator[h5py.File]":
+def opened(path: str | os.PathLike[str]) -> "Iterator[h5netcdf.File]":
     """Context of the file of a dataset, which is known to be one of springtune."""
-    import h5py
-
-    from .netcdf import attributes_of
+    import h5netcdf
 
     path = dataset_file(path)
-    with legible(path), bounded(MOST_HELD):
-        check_alone(path)
-        with h5py.File(path) as file:
-            attributes = attributes_of(file)
-    if "springtune_version" not in attributes:
-        raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
-    name = attributes.get("study", "unknown")
-    if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
-        raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
-    with h5py.File(path) as file:
+    with ExitStack() as stack:
+        with legible(path), bounded(MOST_HELD):
+            check_alone(path)
+            file = stack.enter_context(h5netcdf.File(path, decode_vlen_strings=True))
+            attributes = dict(file.attrs)
+        if "springtune_version" not in attributes:
+            raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
+        name = attributes.get("study", "unknown")
+        if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
+            raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
         yield file
 
 

@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import h5py
+import h5netcdf
 import jinja2
 import numpy as np
 from markupsafe import Markup
@@ -27,7 +27,7 @@ from springtune.registry import imported
 from springtune.safe_io.atomic import write_json, write_text
 
 from ...config.kind import modules
-from .. import netcdf, reading
+from .. import reading
 from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
 from . import View
 
@@ -105,12 +105,10 @@ ROOM = 4_200_000
 """Most characters of all numbers: the page with its library stays below 5 MB."""
 
 
-def packed(file: h5py.File, room: int = ROOM) -> list[dict[str, Any]]:
+def packed(file: h5netcdf.File, room: int = ROOM) -> list[dict[str, Any]]:
     """Describe and pack the groups of a dataset; of a large one the largest variables are left out, and named."""
-    root = netcdf.variables(file)
-    children = [one for one in file.values() if isinstance(one, h5py.Group)]
-    groups = [_described(file, root, root)]
-    groups += [_described(group, own, root) for group in children if (own := netcdf.variables(group))]
+    children = [group for group in file.groups.values() if group.variables]
+    groups = [_described(group, group.variables, file.variables) for group in (file, *children)]
     rows = [(group, row) for group in groups for row in group["variables"]]
     excess = sum(len(row["data"]) for _, row in rows) - room
     # Cells last: without them there is no table.
@@ -122,21 +120,21 @@ def packed(file: h5py.File, room: int = ROOM) -> list[dict[str, Any]]:
     return groups
 
 
-Variables = Mapping[str, netcdf.Stored]
+Variables = Mapping[str, h5netcdf.Variable]
 
 
-def _described(group: h5py.Group, own: Variables, root: Variables) -> dict[str, Any]:
+def _described(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[str, Any]:
     """Describe and pack a group: its `own` variables, with labels that it may share with the `root`."""
     rows: list[dict[str, Any]] = []
     sizes: dict[str, int] = {}
     for name, stored in own.items():
-        sizes |= dict(zip(stored.dims, stored.array.shape))
-        if stored.dims == (name,):
+        sizes |= dict(zip(stored.dimensions, stored.shape))
+        if stored.dimensions == (name,):
             continue
-        row: dict[str, Any] = {"name": name, "dims": list(stored.dims)} | _words_on(stored)
-        if "flag_meanings" in stored.attributes:
-            meanings = str(stored.attributes["flag_meanings"]).split()
-            flags = np.ravel(stored.attributes.get("flag_values", range(len(meanings)))).tolist()
+        row: dict[str, Any] = {"name": name, "dims": list(stored.dimensions)} | _words_on(stored)
+        if "flag_meanings" in stored.attrs:
+            meanings = str(stored.attrs["flag_meanings"]).split()
+            flags = np.ravel(stored.attrs.get("flag_values", range(len(meanings)))).tolist()
             row["flags"] = dict(zip(map(str, flags), meanings))
         values = _values(stored)  # each read, packed and forgotten
         if name == "status":
@@ -147,31 +145,31 @@ def _described(group: h5py.Group, own: Variables, root: Variables) -> dict[str, 
                 row |= {"signed": True, "sign": _sign(name, own, root)}
         rows.append(row | _variable(values))
     dims = [{"name": name, "size": size} | _labels(name, own, root) for name, size in sizes.items()]
-    attributes = {name: _plain(value) for name, value in netcdf.attributes_of(group).items() if name != "coordinates"}
+    attributes = {name: _plain(value) for name, value in group.attrs.items() if name != "coordinates"}
     return {"path": group.name, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
 
 
 def _labels(name: str, own: Variables, root: Variables) -> dict[str, Any]:
     """Labels of a dimension, if it has any, and words on it."""
     stored = own.get(name) or root.get(name)
-    return {"labels": list(map(_plain, stored.read().tolist()))} | _words_on(stored) if stored else {}
+    return {"labels": list(map(_plain, stored[...].tolist()))} | _words_on(stored) if stored else {}
 
 
-def _words_on(stored: netcdf.Stored) -> dict[str, str]:
+def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
     """Attributes in words."""
-    return {name: str(stored.attributes[name]) for name in ("units", "long_name") if name in stored.attributes}
+    return {name: str(stored.attrs[name]) for name in ("units", "long_name") if name in stored.attrs}
 
 
-def _values(stored: netcdf.Stored) -> np.ndarray:
+def _values(stored: h5netcdf.Variable) -> np.ndarray:
     """Values of an array; missing integers are NaN."""
-    values, fill = stored.read(), stored.attributes.get("_FillValue")
+    values, fill = stored[...], stored.attrs.get("_FillValue")
     return np.where(values == fill, np.nan, values) if fill is not None and values.dtype.kind in "iu" else values
 
 
-def _spread(stored: netcdf.Stored, dims: Sequence[str]) -> np.ndarray:
+def _spread(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
     """Values of an array whose axes are those of `dims`, of one place where it has none."""
-    values = stored.read().transpose([stored.dims.index(name) for name in dims if name in stored.dims])
-    return values[tuple(slice(None) if name in stored.dims else None for name in dims)]
+    values = stored[...].transpose([stored.dimensions.index(name) for name in dims if name in stored.dimensions])
+    return values[tuple(slice(None) if name in stored.dimensions else None for name in dims)]
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -191,7 +189,7 @@ def _judged(own: Variables, row: dict[str, Any], status: np.ndarray) -> np.ndarr
     """Statuses, of which solved cells that the linear reference cannot judge get one of their own."""
     flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
     applies = own.get("reference_applies")
-    if "solved" not in flags or applies is None or not set(applies.dims) <= set(row["dims"]):
+    if "solved" not in flags or applies is None or not set(applies.dimensions) <= set(row["dims"]):
         return status
     beyond = max(flags.values()) + 1
     found = np.where((status == flags["solved"]) & (_spread(applies, row["dims"]) == 0), beyond, status)
@@ -214,8 +212,8 @@ def _sign(name: str, own: Variables, root: Variables) -> str:
     group = own if reference in own else root
     if reference not in group or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
         return "positive: too large"
-    dims, others = group[reference].dims, False
-    values = group[reference].read()
+    dims, others = group[reference].dimensions, False
+    values = group[reference][...]
     if "quantity_kind" in group:
         displacements = _spread(group["quantity_kind"], dims) == "displacement"
         others = bool((np.isfinite(values) & ~displacements).any())
