@@ -7,7 +7,7 @@ import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
 from .rows import ROW_HEIGHT
-from .types import mesh_type
+from .types import check_box, mesh_type
 
 FITTING = 1.0 + 1e-9
 """Edge imposed on netgen, over the wanted one: a side of n edges exactly shall not be split into n + 1 by rounding."""
@@ -74,6 +74,7 @@ def free(length: float, height: float, size: float) -> Mesh:
     The sides are divided into equal edges no longer than `size`; inside, netgen makes near-equilateral triangles.
     Deterministic.
     """
+    check_box(length, height, size)
     # Lengths in units of the edge: netgen's own tolerances are absolute.
     size = min(size, max(length, height))  # a side of less than an edge is one edge, and netgen bears no tiny boxes
     box = np.array([length, height]) / size

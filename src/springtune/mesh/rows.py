@@ -2,11 +2,12 @@
 
 import math
 from itertools import cycle
+from numbers import Integral, Real
 
 import numpy as np
 
-from .cells import Mesh, no_cells
-from .types import mesh_type, nearest_counts, nearest_whole
+from .cells import Mesh, MeshError, no_cells
+from .types import check_box, mesh_type, nearest_counts, nearest_whole
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""
@@ -35,6 +36,9 @@ def isosceles(length: float, height: float, size: float, poisson_ratio: float) -
     of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper. `size` is a [m]; the number
     of rows is the nearest, that of cells along x keeps the shape best.
     """
+    check_box(length, height, size)
+    if not (isinstance(poisson_ratio, Real) and 1e-6 <= poisson_ratio <= 1):
+        raise MeshError(f"poisson_ratio: {poisson_ratio!r} has no such rows; give a number above 0 and at most 1")
     rows = nearest_whole(height / row_height(size, poisson_ratio))
     size = 2 * math.sqrt(poisson_ratio) * height / rows
     return _fitted(length, height, nearest_whole(length / size), rows)
@@ -73,6 +77,10 @@ def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None =
     equilateral triangles.
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
+    for name, value in (("cells", cells), ("rows", rows)):
+        if not (isinstance(value, Integral) and value >= 1):
+            raise MeshError(f"{name}: {value!r} is not a whole number above zero; give one, such as 10")
+    check_box(cells * size, rows * row_height, size)
     line = size * np.arange(cells + 1.0)
     return _join(line, line + 0.5 * size, row_height * np.arange(rows + 1.0))
 

@@ -13,6 +13,23 @@ MOST_MESHED = 5_000_000
 """Particles beyond which no mesh is made: its edges alone take gigabytes."""
 
 
+LARGEST_SIZE = 1000.0
+"""Mesh size over the smaller side of a box from which it is taken for an error: cells become slivers [1]."""
+
+
+def check_box(length: float, height: float, size: float) -> None:
+    """Refuse a box that cannot be meshed."""
+    for name, value in (("length", length), ("height", height), ("size", size)):
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        if not (number and 1e-40 <= value <= 1e40):
+            raise MeshError(f"{name}: {value!r} is not a number above zero; give one in m")
+    if size > LARGEST_SIZE * min(length, height):
+        raise MeshError(f"size: {size!r} is no size of {length:g} x {height:g} m; give at most {min(length, height):g}")
+    if not max(length / size, 1.0) * max(height / size, 1.0) <= 2 * MOST_MESHED:
+        least = f"{1e3 * math.sqrt(length * height / MOST_MESHED):.2g} mm"
+        raise MeshError(f"size: {size!r} makes too many particles of {length:g} x {height:g} m; give at least {least}")
+
+
 def too_many(count: float, size: float, side: float, body: str) -> str:
     """Return why so many particles are refused, with the remedy, or an empty string; `size`, `side` in m."""
     if count <= MOST_MESHED:
@@ -37,6 +54,7 @@ def nearest_counts(length: float, height: float, size: float, row_height: float 
     >>> nearest_counts(0.2, 0.04, 0.011)
     (18, 4)
     """
+    check_box(length, height, size)
     return nearest_whole(length / size), nearest_whole(height / (row_height * size))
 
 
