@@ -14,7 +14,7 @@ from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.plan import shape_mesh_key, shape_reference_task, shape_scene_task
-from springtune.studies.kinds.bodies.shape_expand import READ_AT_ONCE
+from springtune.studies.kinds.bodies.shape_expand import LARGEST_FILE_CHECKED
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.runs.rerun import output_files
@@ -246,7 +246,7 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     assert "plate.vtu has parts 'hard'" in refusal(text)
     path = tmp_path / "plate.vtu"  # too large to be looked at as the study is read
     if whole:
-        path.write_bytes(path.read_bytes() + b"<!--" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"-->\n")
+        path.write_bytes(path.read_bytes() + b"<!--" + LARGEST_FILE_CHECKED // 10 * b"nothing at all\n" + b"-->\n")
         cell = scenes(load(text), tmp_path / "results/large")
         assert STATUS[int(cell.status)] == "failed" and "the body has the parts" in cell.message.item()
 
@@ -296,7 +296,7 @@ def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
 
 def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     """What is too large to be looked at as the study is read is looked at by its stages."""
-    comment = b"<!--" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"-->\n"
+    comment = b"<!--" + LARGEST_FILE_CHECKED // 10 * b"nothing at all\n" + b"-->\n"
     path = tmp_path / "plate.vtu"
     path.write_bytes(path.read_bytes() + comment)
     cell = scenes(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")

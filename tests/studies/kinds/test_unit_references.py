@@ -23,7 +23,7 @@ MANY, FEW = 32, 20
 
 @pytest.fixture(autouse=True)
 def few_alone(monkeypatch):
-    monkeypatch.setattr(bodies_plan, "MOST_ALONE", 25)
+    monkeypatch.setattr(bodies_plan, "MOST_SOLVED_ALONE", 25)
 
 
 def text(lengths, outputs="[size]", definition="lattice", more=""):

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from springtune.studies.kinds.bodies.plan import OF_OTHERS
+from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
 from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
 from springtune.studies.runs.source import hash_of
@@ -160,7 +160,7 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
         found = code.closure(f"studies.kinds.bodies.{stage}", without=others).files
         return {path.relative_to(code.PACKAGE).as_posix() for path in found}
 
-    solve, mesh = files("solve", *OF_OTHERS), files("mesh", "studies.kinds.bodies.task_values")
+    solve, mesh = files("solve", *NOT_OF_BEAMS), files("mesh", "studies.kinds.bodies.task_values")
     assert {"mechanics/network.py", "mechanics/statics.py", "springs/lattice.py", "mesh/cells.py"} <= solve
     assert not {"mesh/free.py", "mesh/rows.py"} & solve  # these count with the meshes that they make
     assert "studies/runs/store.py" in solve

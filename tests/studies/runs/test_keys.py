@@ -9,7 +9,7 @@ import yaml
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.kinds.bodies.plan import OF_OTHERS
+from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
@@ -74,7 +74,7 @@ def _keys():
     of_beams = ("studies.kinds.bodies.shape_reference", "reference.finite_strain", "reference.interpolant")
     found["unit"] = keys.stage_key("studies.kinds.bodies.reference", without=of_beams)
     found["box"] = keys.stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
-    found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=OF_OTHERS)
+    found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=NOT_OF_BEAMS)
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
     return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}
 

@@ -113,7 +113,7 @@ def stem(name: str, selection: Mapping[str, str]) -> str:
     return "_".join([name, *selection.values()])
 
 
-def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, str]]) -> dict[str, dict[str, str]]:
+def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
     """Distinct selections of the dimensions `labels` among a study's cells, in order, by stem."""
     chosen = [{label: cell[label] for label in labels} for cell in cells]
     return {stem(name, one): one for one in chosen}

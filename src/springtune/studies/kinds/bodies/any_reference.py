@@ -33,11 +33,11 @@ def read_interpolant(folder, key):
     """Interpolant or None, unit problems solved in its place by key, seconds of one answer, and why there is none."""
     path = Path(folder) / f"{key}.h5"
     state = path.stat() if path.exists() else None
-    return _opened(path, key, (state.st_size, state.st_mtime_ns) if state else None)
+    return _read_interpolant(path, key, (state.st_size, state.st_mtime_ns) if state else None)
 
 
 @lru_cache(maxsize=8)
-def _opened(path, key, state):
+def _read_interpolant(path, key, state):
     """Cache of `read_interpolant` by the size and time of the file."""
     arrays = ("aspect_range", "nu_range", "values")
     results = store.read(path, {key} | (store.stored(path) if state else set()), arrays)

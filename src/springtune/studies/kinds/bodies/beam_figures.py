@@ -25,24 +25,24 @@ from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 
-MOST_SHOWN = 60.0
+LARGEST_ERROR_SHOWN = 60.0
 """Largest error shown [%]."""
 
 
 def sensitivity(tree):
     """Figures of sensitivity curves: stem, function that plots, and selection."""
-    yield from each("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
+    yield from figures_of("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
 
 
-USUAL = "nonlinear"
+USUAL_KINEMATICS = "nonlinear"
 """Kinematics that a figure is of; where a study asks for other ones alone it is of those, and says so."""
 
 
-def each(name, plot, status, names):
+def figures_of(name, plot, status, names):
     """Figures of each selection that has cells, in the usual kinematics or else the first ones present."""
     for stem, selection in distinct(name, names, cells(status != 0, names)).items():
         there = labels_of((status != 0).sel(selection), "kinematics")
-        yield stem, plot, selection | {"kinematics": USUAL if USUAL in there else there[0]}
+        yield stem, plot, selection | {"kinematics": USUAL_KINEMATICS if USUAL_KINEMATICS in there else there[0]}
 
 
 @style.styled
@@ -97,19 +97,19 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     if root is not None and int(root.get("reference_applies", 1)) == 0:
         seen.add("beyond")
     errors = 100 * abs(curves.deformation_error)
-    highest, top = float(errors.max()), MOST_SHOWN
-    if errors.min("stiffness_ratio").max() >= 0.8 * MOST_SHOWN:
+    highest, top = float(errors.max()), LARGEST_ERROR_SHOWN
+    if errors.min("stiffness_ratio").max() >= 0.8 * LARGEST_ERROR_SHOWN:
         top = 1.1 * highest
-    panel.set(ylim=(0, min(top, 1.1 * highest) if highest > 0 else MOST_SHOWN), ylabel="|Deformation error| [%]")
+    panel.set(xlabel=f"Uniform spring stiffness [{written}N/m]", ylabel="|Deformation error| [%]")
+    panel.set_ylim(0, min(top, 1.1 * highest) if highest > 0 else LARGEST_ERROR_SHOWN)
     panel.set_xlim(*((known.min(), known.max()) if len(known) else (0, 1)))
-    panel.set_xlabel(f"Uniform spring stiffness [{written}N/m]")
     panel.set_title(_sensitivity_title(panel, root, selection, words))
     printed = root.paper_stiffness.values if root is not None and "paper_stiffness" in root else np.array(np.nan)
     for value in np.unique(printed[np.isfinite(printed)]) / unit:
         if panel.get_xlim()[0] < value < panel.get_xlim()[1]:
             mark_stiffness(panel, value, f"the paper's {value:g}")
-    key = [Line2D([], [], color="0.3", label=text, **look) for name, (text, look) in KEY.items() if name in seen]
-    labels.finish(panel, why=_why_no_curve(curves), key=key)
+    key = [Line2D([], [], color="0.3", label=text, **look) for name, (text, look) in LEGEND.items() if name in seen]
+    labels.finish(panel, why=_reason_without_curve(curves), key=key)
     return panel
 
 
@@ -119,7 +119,7 @@ def mark_stiffness(panel, value, name):
 
 
 def draw_curve(panel, curve, unit, name, look, known):
-    """Draw one curve; return the keys of `KEY` that it needs."""
+    """Draw one curve; return the keys of `LEGEND` that it needs."""
     marker, colour, seen = look["marker"], look["color"], set()
     line = {"color": colour, "linestyle": look["linestyle"]}
     stiffness, error = curve.stiffness.values, 100 * np.abs(curve.deformation_error.values)
@@ -143,7 +143,7 @@ def draw_curve(panel, curve, unit, name, look, known):
     return seen | {in_words(flag) for flag in flags[np.isnan(error)] if flag > 1 and np.isfinite(error).any()}
 
 
-KEY = {
+LEGEND = {
     "minimum": ("minimum", {"marker": "o", "markersize": 4.5, "linestyle": ""}),
     "predicted": ("predicted", {"marker": "|", "markersize": 9, "markeredgewidth": 1.2, "linestyle": ""}),
     "unstable": ("thin: unstable", {"linewidth": 0.5}),
@@ -158,7 +158,7 @@ def _sensitivity_title(panel, root, selection, swept):
     shown = dict(selection)
     if root is not None and "beam" in shown:
         shown["beam"] = labelled_beam(root, shown["beam"])
-    words = [*named(shown, "beam", "mesh_type", "material", "load"), *swept]
+    words = [*title_labels(shown, "beam", "mesh_type", "material", "load"), *swept]
     first = labels.fitted(panel, [", ".join(words)], 8)
     if root is None:
         return first
@@ -167,7 +167,7 @@ def _sensitivity_title(panel, root, selection, swept):
     return f"{first}\n{with_unit('force', force) if np.isfinite(force) else 'no force'}, {text}".replace("-", "−")
 
 
-def _why_no_curve(curves):
+def _reason_without_curve(curves):
     """Reason why no curve has an error."""
     if 1 in curves.status.values:
         return "solved, but without a reference there is no error"
@@ -185,10 +185,10 @@ def swept_words(values):
     return found
 
 
-def named(selection, *names):
+def title_labels(selection, *names):
     """Labels of a selection for a title."""
     found = [str(selection[name]) for name in names if name in selection]
-    return found + [str(name) for name in [selection.get("kinematics", USUAL)] if name != USUAL]
+    return found + [str(name) for name in [selection.get("kinematics", USUAL_KINEMATICS)] if name != USUAL_KINEMATICS]
 
 
 def by_beam(root, beam, mesh_type, material, load, kinematics):
@@ -203,7 +203,7 @@ def by_beam(root, beam, mesh_type, material, load, kinematics):
 
 # -- deformed networks -------------------------------------------------------------------------------------------------
 
-DEFINITION = ("lattice", "calibrated", "paper")
+SHOWN_FIRST = ("lattice", "calibrated", "paper")
 """Definitions whose network is shown before others that are solved."""
 
 
@@ -211,10 +211,10 @@ def deformed(tree):
     """Figures of deformed networks: one for each mesh type, material and load; see `sensitivity`."""
     status = group(tree, "/").status
     status = status.sel(definition=group(tree, "fields").definition.values)
-    for stem, plot, selection in each("deformed", plot_deformed, status, SCENE_LABELS):
+    for stem, plot, selection in figures_of("deformed", plot_deformed, status, SCENE_LABELS):
         here = status.sel(selection)
         names = labels_of(here.isin((1, 2, 4)), "definition") or labels_of(here != 0, "definition")
-        yield stem, plot, selection | {"definition": next((name for name in DEFINITION if name in names), names[0])}
+        yield stem, plot, selection | {"definition": next((name for name in SHOWN_FIRST if name in names), names[0])}
 
 
 @style.styled
@@ -270,11 +270,11 @@ def plot_deformed(
     extents = [extent(plane(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
     height = max(float(np.clip((style.PAGE - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
-    title = ", ".join(named(selection, "mesh_type", "material", "load"))
-    return labels.small_multiples(ax, shown, 1, 0.75 + height, title, _deformed, said=said)
+    title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
+    return labels.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
 
 
-def _deformed(panel, part):
+def _draw_deformed(panel, part):
     """Draw the network of a beam; return notes."""
     fields, root = part
     # Of the meshes that this beam has, the one that this load is asked for on.
@@ -300,17 +300,17 @@ def _deformed(panel, part):
 
 # -- the pressed block -------------------------------------------------------------------------------------------------
 
-ENERGIES = ("area", "delingette")
+ENERGY_DEFINITIONS = ("area", "delingette")
 """Definitions whose largest error over all loads is shown."""
 
-BLOCK_SHOWN = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
+FACES_SHOWN_FIRST = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
 """Definitions whose pressed faces are shown before others."""
 
 MOST_FACES = 5
 """Networks in the panel of the pressed face."""
 
 
-def _pressing(names):
+def _pressing_load(names):
     """Load whose pressed face is shown: pressure, else the first that presses a face."""
     pressed = [name for name in names if name in LOADS and LOADS[name].kind.pressed]
     return "pressure" if "pressure" in pressed or not pressed else pressed[0]
@@ -319,7 +319,7 @@ def _pressing(names):
 def block(tree):
     """The figure of a pressed block: its last material and beam; its finest structured mesh, or of its first type."""
     present = group(tree, "/").status != 0
-    present = present.sel(load=[_pressing(labels_of(present, "load"))])
+    present = present.sel(load=[_pressing_load(labels_of(present, "load"))])
     types = labels_of(present, "mesh_type")
     selection = {"mesh_type": "structured" if "structured" in types else types[0]}
     present = present.sel(mesh_type=[selection["mesh_type"]])
@@ -364,7 +364,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     """
     faces, root = group(data, "block", alone=False), group(data, "/")
     asked = root.status != 0
-    load = _pressing(labels_of(asked, "load"))
+    load = _pressing_load(labels_of(asked, "load"))
     chosen = choose(asked.sel(load=[load]), beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
     figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 3.0))
     size = 1e3 * chosen["mesh_size"]
@@ -377,12 +377,12 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
     here, faces = at(here, values), at(faces.sel(chosen), values)
     curves = None if curves is None else at(curves, values)
-    labels.finish(left, *_stiffness(left, curves, here))
-    labels.finish(right, *_profile(right, faces, here, load))
+    labels.finish(left, *_draw_errors_over_stiffness(left, curves, here))
+    labels.finish(right, *_draw_pressed_face(right, faces, here, load))
     return axes[0]
 
 
-def _stiffness(panel, curves, root):
+def _draw_errors_over_stiffness(panel, curves, root):
     """Draw errors in linear kinematics; return notes, and the reason if there is no curve."""
     panel.set(xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
     panel.set_title("One stiffness for all loads? (small strain)")
@@ -402,8 +402,8 @@ def _stiffness(panel, curves, root):
     within = (curves.stiffness >= low) & (curves.stiffness <= high)
     highest = 100 * float(abs(curves.deformation_error).where(within).max())
     networks = root.sel(kinematics="linear", load=asked)
-    for number, name in enumerate(labels_of(networks.status.sel(definition=networks.definition.isin(ENERGIES)) != 0,
-                                            "definition")):  # fmt: skip
+    energies = [name for name in labels_of(networks.status != 0, "definition") if name in ENERGY_DEFINITIONS]
+    for number, name in enumerate(energies):
         errors = 100 * np.abs(networks.deformation_error.sel(definition=name).values)
         if np.isfinite(errors).all():
             worst, look = errors.max(), style.line(len(loads) + number) | {"marker": ""}
@@ -417,8 +417,8 @@ def _stiffness(panel, curves, root):
     return said, ""
 
 
-def _profile(panel, block, root, load):
-    """Draw the pressed face over the reference of its kinematics; returns as `_stiffness`."""
+def _draw_pressed_face(panel, block, root, load):
+    """Draw the pressed face over the reference of its kinematics; returns as `_draw_errors_over_stiffness`."""
     x, pressed, said = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")
@@ -431,7 +431,7 @@ def _profile(panel, block, root, load):
     kind = law if finite else str(block.reference.values[0])
     profiles = {f"reference, {kind.replace('-', ' ')}": pressed.reference_face_profile.sel(reference=kind)}
     asked = labels_of(root.status.sel(load=[load]) != 0, "definition")
-    for definition in sorted(asked, key=lambda name: (name not in BLOCK_SHOWN, asked.index(name))):
+    for definition in sorted(asked, key=lambda name: (name not in FACES_SHOWN_FIRST, asked.index(name))):
         usual = [one for one in (("nonlinear",) if finite else ("linear", "nonlinear")) if one in solved.kinematics]
         drawn = [one for one in usual if solved.sel(definition=definition, kinematics=one)]
         if drawn and len(profiles) <= MOST_FACES:

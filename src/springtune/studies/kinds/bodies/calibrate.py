@@ -15,7 +15,7 @@ def prepare(file, content):
 def solve(task, folder):
     """Calibrated stiffness of a group of scenes [N/m], or None with the reason."""
     try:
-        return {"stiffness": calibrate(_best(folder, member) for member in task["members"])}
+        return {"stiffness": calibrate(_best_stiffness(folder, member) for member in task["members"])}
     except ValueError as error:
         return {"stiffness": None, "message": str(error)}
 
@@ -25,7 +25,7 @@ def failed(task, why):
     return {"stiffness": None, "message": why}
 
 
-def _best(folder, member):
+def _best_stiffness(folder, member):
     """Name of a curve, its best stiffness [N/m], and the reason if it has none."""
     name = member["curve"]
     curve = store.read(folder / f"{member['mesh']}.h5", [name])[name]

@@ -20,16 +20,16 @@ from ...output.dataset import NO_NODE
 from ...output.selection import OF_FIELDS
 from ...runs import store
 from . import any_reference, plan, stored
-from .outputs import CASE_AXES, DRAWING, MESH_AXES, pressed
+from .outputs import CASE_AXES, MESH_AXES, SHAPES_OUTPUT, pressed
 from .stored import FIELD_ARRAYS, fields_key, stored_key
-from .task_values import named, quantity_key
+from .task_values import quantity_key, with_names
 from .variables import (
     AT_FINITE_STRAIN,
     BLOCK,
     CELL,
     FIELDS,
     FINITE_STRAIN,
-    OF_PRINT,
+    PRINTED_PREFIX,
     ROOT,
     SENSITIVITY,
     SHAPE_FIELDS,
@@ -49,8 +49,8 @@ FACE_VARIABLES = {
 
 def groups(study, folder):
     """Groups of a dataset by name, from the stored results of a study in a folder."""
-    beams = _beams(study, folder) if study.scenes else {}
-    return beams | (_shapes(study, folder) if study.shapes else {})
+    beams = _beam_groups(study, folder) if study.scenes else {}
+    return beams | (_shape_groups(study, folder) if study.shapes else {})
 
 
 # -- what beams and shapes share ---------------------------------------------------------------------------------------
@@ -99,38 +99,38 @@ def _outline_row(points, moved):
 # -- beams -------------------------------------------------------------------------------------------------------------
 
 
-def _beams(study, folder):
+def _beam_groups(study, folder):
     """Groups of beams."""
     axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
     read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
     answers = {one: read(one.beam, one.material, one.load) for one in study.references}  # for 1 N: each is read once
     planes = [{"material": one.name, "material_plane": one.plane} for one in {one.material for one in answers}]
-    cells, faces, fields = _scenes(study, folder, answers)
+    cells, faces, fields = _scene_rows(study, folder, answers)
     meshes = [mesh.labels | stored.read_notes(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes]
-    rows = [*planes, *_bodies(study), *meshes, *_references(study, answers), *cells, *_printed(study)]
+    rows = [*planes, *_body_rows(study), *meshes, *_reference_rows(study, answers), *cells, *_printed_rows(study)]
     data = swept(ROOT, study).of_rows(axes, rows)
     _comment(data, answers)
-    _compare(data.deformation_error, data.displacement, data.reference_displacement)
+    _write_errors(data.deformation_error, data.displacement, data.reference_displacement)
     found = {ROOT.name: data}
     if study.curves:
-        found[SENSITIVITY.name] = swept(SENSITIVITY, study).of_rows(axes, _curves(study, folder, answers))
+        found[SENSITIVITY.name] = swept(SENSITIVITY, study).of_rows(axes, _curve_rows(study, folder, answers))
     if study.further_references:
-        rows = [*planes, *_finite_references(study, folder)]
+        rows = [*planes, *_finite_reference_rows(study, folder)]
         finite = swept(FINITE_STRAIN, study).of_rows(axes | {"reference": study.further_references}, rows)
-        _compare(finite.deformation_error, data.displacement, finite.reference_displacement)
+        _write_errors(finite.deformation_error, data.displacement, finite.reference_displacement)
         found[FINITE_STRAIN.name] = finite
     if pressed(study):
-        kinds = _small_strain(study), *study.further_references
-        rows = [*planes, *_face_references(study, folder, kinds), *faces]
+        kinds = _small_strain_name(study), *study.further_references
+        rows = [*planes, *_face_reference_rows(study, folder, kinds), *faces]
         axes_of_faces = axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}
         block = found[BLOCK.name] = swept(BLOCK, study).of_rows(axes_of_faces, rows)
-        _compare(block.face_error, block.face_displacement, block.reference_face_displacement)
+        _write_errors(block.face_error, block.face_displacement, block.reference_face_displacement)
     if keeps_fields(study):
-        found[FIELDS.name] = _fields_of_rows(fields_of(study), axes, [*fields, *_at_rest(study, folder)])
+        found[FIELDS.name] = _fields_of_rows(fields_of(study), axes, [*fields, *_rest_rows(study, folder)])
     return found
 
 
-def _bodies(study):
+def _body_rows(study):
     """Rows of materials and beams."""
     for one in {scene.material for scene in study.scenes}:
         own = {"young_modulus": one.young_modulus, "poisson_ratio": one.poisson_ratio}
@@ -158,7 +158,7 @@ def _comment(data, answers):
         )
 
 
-def _references(study, answers):
+def _reference_rows(study, answers):
     """Rows of references."""
     for one, result in answers.items():
         labels = study.labels(one)
@@ -182,7 +182,7 @@ def _reference(study, folder, one, fields=()):
     return any_reference.read(folder / "references", reference, fields)
 
 
-def _scenes(study, folder, answers):
+def _scene_rows(study, folder, answers):
     """Rows of the scenes in the root, of pressed faces, and of whole fields; each file is read once."""
     names = "beam", "material", "load", *(one for one in study.swept if one != "stiffness_scale")
     objections = {
@@ -210,16 +210,16 @@ def _scenes(study, folder, answers):
     return cells, faces, fields
 
 
-def _printed(study):
+def _printed_rows(study):
     """Rows of printed cells that the study asks for."""
     for cell in study.printed:
         labels = {name: getattr(cell, name) for name in CELL}
         if all(label in study.axes[name] for name, label in labels.items()):
-            own = (name for name in ROOT.variables if name.startswith(OF_PRINT))
-            yield labels | {name: getattr(cell, name.removeprefix(OF_PRINT)) for name in own}
+            own = (name for name in ROOT.variables if name.startswith(PRINTED_PREFIX))
+            yield labels | {name: getattr(cell, name.removeprefix(PRINTED_PREFIX)) for name in own}
 
 
-def _curves(study, folder, answers):
+def _curve_rows(study, folder, answers):
     """Rows of sensitivity curves."""
     for mesh, curves in plan.curves_by_mesh(study).items():
         tasks = [plan.curve_task(study, curve) for curve in curves]
@@ -241,13 +241,13 @@ def _curves(study, folder, answers):
             }
 
 
-def _small_strain(study):
+def _small_strain_name(study):
     """Name of the reference of small strain, by the planes of the materials."""
     planes = {one.material.plane for one in study.references}
     return "small-strain" if len(planes) > 1 else f"small-strain-plane-{planes.pop()}"
 
 
-def _finite_references(study, folder):
+def _finite_reference_rows(study, folder):
     """Rows of references at finite strain."""
     for one, kind in product(study.references, study.further_references):
         result, known = _finite_reference(folder, one, kind), ("message", "displacement", "error_estimate")
@@ -259,14 +259,14 @@ def _finite_reference(folder, one, kind, fields=()):
     return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
 
 
-def _compare(error, network, reference):
+def _write_errors(error, network, reference):
     """Write deformation errors where both displacements are known: often few cells."""
     network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
     there = np.isfinite(network) & np.isfinite(reference)
     error.values[there] = deformation_error(network[there], reference[there])
 
 
-def _face_references(study, folder, kinds):
+def _face_reference_rows(study, folder, kinds):
     """Rows of pressed faces of references: middle, mean and profile."""
     from scipy.interpolate import CubicSpline  # here: only pressed faces need it
 
@@ -290,7 +290,7 @@ def _face_references(study, folder, kinds):
         yield row
 
 
-def _at_rest(study, folder):
+def _rest_rows(study, folder):
     """Rows of meshes, outlines, and references at the particles of the scenes whose fields are stored."""
     shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
     meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
@@ -316,25 +316,25 @@ def _at_rest(study, folder):
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
 
-def _shapes(study, folder):
+def _shape_groups(study, folder):
     """Groups of shapes."""
     shapes = study.shapes
-    answers = {case: _answer(study, folder, *case) for case in shapes.referred}
-    rows = [*_quantities(shapes), *_shape_references(study, answers), *_shape_scenes(study, folder, answers)]
+    answers = {case: _shape_reference(study, folder, *case) for case in shapes.referred}
+    rows = [*_quantity_rows(shapes), *_shape_reference_rows(study, answers), *_shape_scene_rows(study, folder, answers)]
     found = {SHAPES.name: SHAPES.of_rows(study.axes, rows)}
     if shapes.finite:
         found[AT_FINITE_STRAIN.name] = _shapes_at_finite_strain(study, folder, found[SHAPES.name].value)
-    if DRAWING in study.outputs:
+    if SHAPES_OUTPUT in study.outputs:
         found[SHAPE_FIELDS.name] = _shape_fields(study, folder)
     return found
 
 
-def _answer(study, folder, *case, arrays=()):
+def _shape_reference(study, folder, *case, arrays=()):
     """Stored result of a reference: of a shape, material and load, and a law at finite strain."""
     return store.read_one(folder / "references", plan.shape_reference_task(study, *case)["key"], arrays)
 
 
-def _quantities(shapes):
+def _quantity_rows(shapes):
     """Rows of what quantities are."""
     for shape, load in dict.fromkeys((one.shape, one.load) for one in shapes.scenes):
         yield {"shape": shape, "shape_thickness": shapes.shape[shape].thickness}
@@ -344,10 +344,10 @@ def _quantities(shapes):
             yield {"shape": shape, "load": load, "quantity": one.name} | about
 
 
-def _whys(shapes, shape, load, result):
+def _reasons(shapes, shape, load, result):
     """Why a reference, or a quantity of it, is missing, in the names of the study."""
     whys = (result["message"], *result.get("lacking", {}).values())
-    return [named(why, shapes.shape[shape], shapes.shape[shape].loads[load]) for why in whys if why]
+    return [with_names(why, shapes.shape[shape], shapes.shape[shape].loads[load]) for why in whys if why]
 
 
 def _shape_objection(result, kinematics):
@@ -355,11 +355,11 @@ def _shape_objection(result, kinematics):
     return "" if result["message"] or kinematics == "linear" else beyond_linear(result["rotation"], result["strain"])
 
 
-def _shape_references(study, answers):
+def _shape_reference_rows(study, answers):
     """Rows of references."""
     for (shape, material, load), result in answers.items():
         labels = {"shape": shape, "material": material, "load": load}
-        whys = [*_whys(study.shapes, shape, load, result), _shape_objection(result, "nonlinear")]
+        whys = [*_reasons(study.shapes, shape, load, result), _shape_objection(result, "nonlinear")]
         row = {f"reference_{name}": result.get(name) for name in ("seconds", "unknowns", "rotation", "strain")}
         yield labels | row | {"reference_message": "; ".join(filter(None, whys))}
         if result["message"]:
@@ -367,7 +367,7 @@ def _shape_references(study, answers):
         for kinematics in study.axes["kinematics"]:
             yield labels | {"kinematics": kinematics, "reference_applies": not _shape_objection(result, kinematics)}
         for one in study.shapes.shape[shape].loads[load].quantities:
-            row = labels | {"quantity": one.name} | _value(result, one)
+            row = labels | {"quantity": one.name} | _reference_values(result, one)
             yield row | {"reference_expected_error": _error(row["reference_value"], one.expected)}
 
 
@@ -375,12 +375,12 @@ def _shapes_at_finite_strain(study, folder, values):
     """Group of references at finite strain, and the errors of the networks with their law."""
     shapes, rows, references = study.shapes, [], {}
     for shape, material, load, law in shapes.finite:
-        result = _answer(study, folder, shape, material, load, law)
+        result = _shape_reference(study, folder, shape, material, load, law)
         labels = {"shape": shape, "material": material, "load": load, "law": law}
         references[shape, material, load, law] = result.get("values", {})
-        rows.append(labels | {"reference_message": "; ".join(_whys(shapes, shape, load, result))})
+        rows.append(labels | {"reference_message": "; ".join(_reasons(shapes, shape, load, result))})
         for one in shapes.shape[shape].loads[load].quantities if not result["message"] else ():
-            rows.append(labels | {"quantity": one.name} | _value(result, one))
+            rows.append(labels | {"quantity": one.name} | _reference_values(result, one))
     for one in shapes.scenes:
         reference = references.get((one.shape, one.material, one.load, one.law), {})
         for quantity in shapes.shape[one.shape].loads[one.load].quantities if reference else ():
@@ -391,14 +391,14 @@ def _shapes_at_finite_strain(study, folder, values):
     return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
-def _value(result, quantity):
+def _reference_values(result, quantity):
     """Value of a quantity in a reference that did not fail, and its error estimate."""
     key = quantity_key(quantity)
     names = {"reference_value": "values", "reference_error_estimate": "error_estimates"}
     return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
 
 
-def _shape_scenes(study, folder, answers):
+def _shape_scene_rows(study, folder, answers):
     """Rows of meshes and scenes."""
     for file, scenes in plan.shape_scenes_by_mesh(study).items():
         labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
@@ -406,16 +406,17 @@ def _shape_scenes(study, folder, answers):
         keys = {one: plan.shape_scene_task(study, one)["key"] for one in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
         for one, key in keys.items():
-            yield from _shape_scene(study.shapes, one, results[key], answers.get((one.shape, one.material, one.load)))
+            reference = answers.get((one.shape, one.material, one.load))
+            yield from _rows_of_shape_scene(study.shapes, one, results[key], reference)
 
 
-def _shape_scene(shapes, one, result, reference):
+def _rows_of_shape_scene(shapes, one, result, reference):
     """Rows of a scene."""
     labels, case, whys = vars(one), shapes.shape[one.shape].loads[one.load], []
     if reference:
-        whys = [f"no reference: {why}" for why in _whys(shapes, one.shape, one.load, reference)]
+        whys = [f"no reference: {why}" for why in _reasons(shapes, one.shape, one.load, reference)]
         whys.append(_shape_objection(reference, one.kinematics))
-    message = named(result.get("message", ""), shapes.shape[one.shape], case)
+    message = with_names(result.get("message", ""), shapes.shape[one.shape], case)
     message = _with_objection(result, message, "; ".join(filter(None, whys)))
     yield result | labels | {"solve_seconds": result["seconds"], "message": message}
     known = (reference or {}).get("values", {})
@@ -436,18 +437,20 @@ def _shape_fields(study, folder):
     drawn, cases = plan.drawn_scenes(study), {}
     for one in (one for one in study.shapes.scenes if one in drawn):
         cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
-    rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(study, folder, scenes)]
+    rows = [{"case": case} | row for case, scenes in cases.items() for row in _case_rows(study, folder, scenes)]
     return _fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
 
 
-def _drawn(study, folder, scenes):
+def _case_rows(study, folder, scenes):
     """Rows of a case: its labels, outline, mesh and networks."""
     one, file = scenes[0], plan.shape_stem(scenes[0])
     about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
     yield about | {"case_mesh_size": one.mesh_size}
     body = one.shape, one.material, one.load
     if body in study.shapes.referred:
-        found = _answer(study, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths"))
+        found = _shape_reference(
+            study, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths")
+        )
         if not found["message"]:
             sizes = found["outline_lengths"]
             rounds = {"outline_round": np.repeat(np.arange(len(sizes)), sizes)}

@@ -8,39 +8,39 @@ from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import BEYOND_SMALL_STRAIN, in_words
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, sign_of_errors
-from .beam_figures import USUAL, by_beam, each, named, swept_words
+from .beam_figures import USUAL_KINEMATICS, by_beam, figures_of, swept_words, title_labels
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 from .tables import like_with_like
 
-MOST_LINES = 6
+MOST_DEFINITIONS_IN_PANEL = 6
 """Definitions in one panel; more of them take further rows of panels."""
 
 # -- what both have ----------------------------------------------------------------------------------------------------
 
 
-def compared(root, selection):
+def title_of_errors(root, selection):
     """Title of a figure of errors."""
     finite = root.attrs.get("finite_strain") and selection["kinematics"] != "linear"
     return ", ".join(
-        [*named(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
+        [*title_labels(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
     )
 
 
-def _looks(root):
+def _line_styles(root):
     """Line style of each definition."""
     return {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
 
 
-def _parts(words, present):
-    """Definitions of a panel's part, at most `MOST_LINES`, by its title."""
+def _panels_of(words, present):
+    """Definitions of a panel's part, at most `MOST_DEFINITIONS_IN_PANEL`, by its title."""
     asked = labels_of(present, "definition")
-    parts = np.array_split(asked, -(-len(asked) // MOST_LINES))
+    parts = np.array_split(asked, -(-len(asked) // MOST_DEFINITIONS_IN_PANEL))
     several = len(parts) > 1
     return {f"{words}, {number} of {len(parts)}" if several else words: part.tolist()
             for number, part in enumerate(parts, start=1)}  # fmt: skip
 
 
-def _multiples(ax, shown, draw, title, sign):
+def _draw_panels(ax, shown, draw, title, sign):
     """Small multiples of deformation errors: `draw` gets a panel and its part; it returns notes."""
 
     def drawn(panel, part):
@@ -51,7 +51,7 @@ def _multiples(ax, shown, draw, title, sign):
     return labels.small_multiples(ax, shown, 2 if len(shown) == 4 else 3, 2.1, title, drawn, sharey=True, said=sign)
 
 
-def _lines(panel, places, here, looks, listed, gaps):
+def _draw_lines(panel, places, here, looks, listed, gaps):
     """Draw a line a definition, hollow where its error is in doubt; return what a note says.
 
     ``places`` are those along x of each. ``gaps`` says whether cells that were not asked for leave any.
@@ -81,7 +81,7 @@ def _lines(panel, places, here, looks, listed, gaps):
 
 def size(tree):
     """Figures of errors against mesh size: one for each mesh type, material and load."""
-    yield from each("size", plot_size, group(tree, "/").status, SCENE_LABELS)
+    yield from figures_of("size", plot_size, group(tree, "/").status, SCENE_LABELS)
 
 
 @style.styled
@@ -119,20 +119,20 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     ('Mesh size [mm]', 'Deformation error [%]')
     """
     root, beams, selection = by_beam(like_with_like(data), beam, mesh_type, material, load, kinematics)
-    looks = _looks(root)
+    looks = _line_styles(root)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
     shown = {}
     for name in beams:
         here = root.sel(beam=name)
         words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
-        parts = _parts(", ".join(words), here.status != 0)
+        parts = _panels_of(", ".join(words), here.status != 0)
         shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
-    return _multiples(ax, shown, _over_sizes, compared(root, selection), sign_of_errors(root))
+    return _draw_panels(ax, shown, _draw_over_sizes, title_of_errors(root, selection), sign_of_errors(root))
 
 
-def _over_sizes(panel, here, looks):
-    """Draw errors of a beam over mesh size: as `_lines`."""
+def _draw_over_sizes(panel, here, looks):
+    """Draw errors of a beam over mesh size: as `_draw_lines`."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes = 1e3 * here.mesh_size.values
     places = labels.sizes_axis(panel, sizes, len(looks))
@@ -140,7 +140,7 @@ def _over_sizes(panel, here, looks):
     def listed(numbers):
         return f"{', '.join(f'{sizes[number]:g}' for number in numbers)} mm"
 
-    said = _lines(panel, places, here, looks, listed, True)
+    said = _draw_lines(panel, places, here, looks, listed, True)
     if "paper_displacement" in here:
         printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
         if (here.force < 0).all():  # printed without sign
@@ -151,7 +151,7 @@ def _over_sizes(panel, here, looks):
 
 # -- against what is swept ---------------------------------------------------------------------------------------------
 
-WIDE = 20.0
+LOGARITHMIC_FROM_RATIO = 20.0
 """Largest value over the smallest from which on an axis is logarithmic."""
 
 
@@ -162,8 +162,8 @@ def sweep(tree):
     for name in names:
         for stem, selection in distinct(f"sweep_{name}", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
             here = present.sel(selection)
-            counts = {one: _most(here.sel(kinematics=one), name) for one in labels_of(here, "kinematics")}
-            chosen = max(counts, key=lambda one: (counts[one], one == USUAL))
+            counts = {one: _most_values(here.sel(kinematics=one), name) for one in labels_of(here, "kinematics")}
+            chosen = max(counts, key=lambda one: (counts[one], one == USUAL_KINEMATICS))
             if counts[chosen] > 1:
                 yield stem, plot_sweep, selection | {"parameter": name, "kinematics": chosen}
 
@@ -225,26 +225,27 @@ def plot_sweep(
     needed = ("status", "deformation_error", "reference_applies", "beam_length", "beam_height")
     root = root[[name for name in needed if name in root]]
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
-    looks = _looks(root)
-    several = [name for name in beams if _most((root.status != 0).sel(beam=[name]), parameter) > 1]
+    looks = _line_styles(root)
+    several = [name for name in beams if _most_values((root.status != 0).sel(beam=[name]), parameter) > 1]
     shown = {}
     for name in several or beams:
-        here = _of_beam(root, name, parameter, mesh_size)
-        parts = _parts(here.attrs["words"], here.status != 0)
+        here = _errors_of_beam(root, name, parameter, mesh_size)
+        parts = _panels_of(here.attrs["words"], here.status != 0)
         shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
 
     def draw(panel, here, looks):
-        return _over_values(panel, here, looks, parameter)
+        return _draw_over_values(panel, here, looks, parameter)
 
-    return _multiples(ax, shown, draw, compared(root, selection), sign_of_errors(whole.sel(load=selection["load"])))
+    sign = sign_of_errors(whole.sel(load=selection["load"]))
+    return _draw_panels(ax, shown, draw, title_of_errors(root, selection), sign)
 
 
-def _most(present, parameter):
+def _most_values(present, parameter):
     """Largest number of values of a parameter that a beam has."""
     return int(present.any([name for name in present.dims if name not in ("beam", parameter)]).sum(parameter).max())
 
 
-def _of_beam(root, name, parameter, mesh_size):
+def _errors_of_beam(root, name, parameter, mesh_size):
     """Errors of a beam over a parameter and definitions; the attribute `words` is the panel's title."""
     here = root.sel(beam=name)
     present = (here.status != 0).any("definition")
@@ -265,8 +266,8 @@ def _of_beam(root, name, parameter, mesh_size):
     return at(here, values).assign_attrs(words=words)
 
 
-def _over_values(panel, here, looks, parameter):
-    """Draw errors over a parameter: as `_lines`."""
+def _draw_over_values(panel, here, looks, parameter):
+    """Draw errors over a parameter: as `_draw_lines`."""
     here, (words, _, unit) = here.transpose("definition", parameter, ...), SWEPT_SHOWN[parameter]
     x = unit * here[parameter].values
 
@@ -277,7 +278,7 @@ def _over_values(panel, here, looks, parameter):
 
     panel.set_xlabel(words)
     asked = x[(here.status != 0).any("definition").values]
-    if len(asked) > 1 and asked.min() > 0 and asked.max() / asked.min() > WIDE:
+    if len(asked) > 1 and asked.min() > 0 and asked.max() / asked.min() > LOGARITHMIC_FROM_RATIO:
         panel.set_xscale("log")
     # What other beams or grids ask for makes no gaps.
-    return _lines(panel, [x] * len(looks), here, looks, listed, False)
+    return _draw_lines(panel, [x] * len(looks), here, looks, listed, False)

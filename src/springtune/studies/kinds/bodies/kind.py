@@ -48,7 +48,7 @@ def _axes(found):
     return labels | {"quantity": tuple(dict.fromkeys(asked))}
 
 
-def _size(shape, file):
+def _extents(shape, file):
     """Extents of a shape in words, or of a mesh file of it."""
     if not file:
         return size_text(*np.ptp(shape.extent, axis=0))
@@ -72,7 +72,7 @@ def _summary(found):
     rows = [["shape scenes", len(shapes.scenes), f"of {words}, {quantities} quantities"]]
     for name, count in counts.items():
         shape, files = shapes.shape[name], shapes.files[name].values()
-        rows += [[f"  {name}", count, "; ".join(_size(shape, file) for file in files or [""])]]
+        rows += [[f"  {name}", count, "; ".join(_extents(shape, file) for file in files or [""])]]
     if count := len(shapes.referred) + len(shapes.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
@@ -115,16 +115,16 @@ def summary(study: Study, further: list[list[object]]) -> str:
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", meshes, f"each serves {each:.3g} scenes and curves on average"],
-        ["references", len(study.references), f"from {_solutions(study)}: {scaled}"],
+        ["references", len(study.references), f"from {_count_solutions(study)}: {scaled}"],
         ["curves", len(study.curves), f"{len(study.stiffness_ratios)} stiffnesses each, along one solution path"],
         *further,
         *([["printed", len(study.printed), "cells to compare with"]] if study.printed else []),
     ]
-    grids = aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))
+    grids = aligned(_grid_rows(study), left=0, right=(1, 2, 3, 4, 5))
     return "\n".join([title, "", aligned(rows, left=0, right=(1,)), "", grids])
 
 
-def _solutions(study: Study) -> str:
+def _count_solutions(study: Study) -> str:
     """Number of finite-element solutions of the references, in words."""
     problems = {
         unit_problem(one.beam, one.material, LOADS[one.load].kind)
@@ -137,7 +137,7 @@ def _solutions(study: Study) -> str:
     return " and ".join(words)
 
 
-def _contributions(study: Study) -> list[list[object]]:
+def _grid_rows(study: Study) -> list[list[object]]:
     """Rows of a table of grids; new scenes are those that no grid above has."""
     rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()

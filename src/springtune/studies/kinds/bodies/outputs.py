@@ -30,13 +30,13 @@ SWEPT_SHOWN = {
 
 PLOTS, ERROR_PLOTS = "studies.kinds.bodies.beam_figures", "studies.kinds.bodies.errors"
 
-TABLE = ("load", "mesh_type", "material")
+TABLE_LABELS = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""
 
 
 def stem(selection: Mapping[str, str], number: int | None = None) -> str:
     """Stem of a table's file: the paper's number where it has one, else the labels."""
-    return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
+    return f"table_{number}" if number else "_".join(selection[label] for label in TABLE_LABELS)
 
 
 @once_a_study
@@ -44,7 +44,7 @@ def stems(study: "Study") -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
-    found = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
+    found = [stem(dict(zip(TABLE_LABELS, labels)), numbers.get(labels)) for labels in chosen]
     found += ["finite_strain"] if study.further_references else []
     found += ["block"] if pressed(study) else []
     found += ["shapes"] if study.shapes else []
@@ -79,19 +79,19 @@ CASE_AXES = ("shape", "material", "load")
 SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 """Dimensions of the group ``/shapes``."""
 
-MADE = "free"
+GENERATED_MESH = "free"
 """Mesh type of shapes with an outline: Delaunay triangles inside it."""
 
-OWN_FILE = "file"
+MESH_OF_FILE = "file"
 """Mesh type of a shape whose mesh is that of its file."""
 
-DRAWING = "shapes"
+SHAPES_OUTPUT = "shapes"
 """Output that is made of whole networks."""
 
-OVERVIEW = "shapes_overview"
+OVERVIEW_STEM = "shapes_overview"
 """Stem of the figure of all quantities."""
 
-ERRORS, DEFORMED = "shapes_errors", "shapes_deformed"
+ERRORS_STEM, DEFORMED_STEM = "shapes_errors", "shapes_deformed"
 """First parts of the stems of the figures of a shape under a load."""
 
 
@@ -102,8 +102,8 @@ def mesh_name(one: Any) -> str:
 
 def shape_figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
     """Figures by stem: of all quantities, and of each shape and load its errors and its networks."""
-    found: dict[str, dict[str, str]] = {OVERVIEW: {}} if cases else {}
-    for name in (ERRORS, DEFORMED):
+    found: dict[str, dict[str, str]] = {OVERVIEW_STEM: {}} if cases else {}
+    for name in (ERRORS_STEM, DEFORMED_STEM):
         found |= {figure_stem(name, one): one for one in cases}
     return found
 
@@ -163,7 +163,7 @@ OUTPUTS = (
         lack=_lack_of_pressure,
     ),
     Output(
-        DRAWING,
+        SHAPES_OUTPUT,
         "errors and deformed networks of shapes, and the group `/shape_fields`",
         figures=lambda study: shape_figures(_shape_cases(study)),
         plot="studies.kinds.bodies.shape_figures:shapes",

@@ -18,8 +18,8 @@ from ...runs import attempts
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import hash_of
-from .outputs import DRAWING, OWN_FILE, mesh_name
-from .stored import CALIBRATION
+from .outputs import MESH_OF_FILE, SHAPES_OUTPUT, mesh_name
+from .stored import CALIBRATION_STEM
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
@@ -36,16 +36,16 @@ def particles(area, mesh_size):
     return area / (0.866 * mesh_size**2)
 
 
-SEARCHING = {"adjoint", "annealed", "evolved", "best-springs"}
+SEARCHED_DEFINITIONS = {"adjoint", "annealed", "evolved", "best-springs"}
 """Definitions that search for their springs, which takes about fifty times as long as their scene."""
 
 
 def expected_seconds(particles, definition=""):
     """Expected seconds of a scene, a curve or a mesh."""
-    return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHING else 1)
+    return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHED_DEFINITIONS else 1)
 
 
-def _grouped(items, key):
+def _group_by(items, key):
     """Items by a key, in order."""
     groups = defaultdict(list)
     for item in items:
@@ -56,29 +56,29 @@ def _grouped(items, key):
 @once_a_study
 def scenes_by_mesh(study):
     """Scenes of a study by their mesh."""
-    return _grouped(study.scenes, attrgetter("mesh"))
+    return _group_by(study.scenes, attrgetter("mesh"))
 
 
 @once_a_study
 def curves_by_mesh(study):
     """Sensitivity curves of a study by their mesh."""
-    return _grouped(study.curves, attrgetter("mesh"))
+    return _group_by(study.curves, attrgetter("mesh"))
 
 
 @once_a_study
 def shape_scenes_by_mesh(study):
     """Scenes of shapes by the stem of their mesh, which differs from those of beams."""
-    return _grouped(study.shapes.scenes if study.shapes else (), shape_stem)
+    return _group_by(study.shapes.scenes if study.shapes else (), shape_stem)
 
 
 # -- references that are interpolated ----------------------------------------------------------------------------------
 #
 # Where that takes fewer solves. An interpolant has no whole fields; references that need one are solved one by one.
 
-MOST_ALONE = 100
+MOST_SOLVED_ALONE = 100
 """Unit problems of one kind of load that are solved one by one, some 3 s; more are interpolated."""
 
-ASPECT_STEPS = 10
+ASPECT_STEPS_IN_DECADE = 10
 """Ends of ranges of aspect ratios: so many in a decade, each 1.26 times the one before. Aspect ratios that are added to
 a study mostly leave its interpolant as it is."""
 
@@ -102,8 +102,8 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
         aspect_ratio, nu, kind = problem = unit_problem(beam, material, LOADS[load].kind)
         if problem not in whole and kind.mirrored and -1 < nu <= 0.5:
             kinds.setdefault(kind.name, {})[body] = aspect_ratio, nu
-    problems = {name: set(own.values()) for name, own in kinds.items()}
-    return {name: (box_of(problems[name]), own) for name, own in kinds.items() if len(problems[name]) > MOST_ALONE}
+    several = {name: own for name, own in kinds.items() if len({*own.values()}) > MOST_SOLVED_ALONE}
+    return {name: (box_of({*own.values()}), own) for name, own in several.items()}
 
 
 def box_of(problems: set[tuple[float, float]]) -> "Box":
@@ -120,8 +120,9 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
     first, last, least, largest = min(aspects), max(aspects), min(nus), max(nus)
     if first < last:
         # An end that is one of the steps stays where it is, though its logarithm is rounded.
-        steps = floor(ASPECT_STEPS * log10(first) + 1e-5), ceil(ASPECT_STEPS * log10(last) - 1e-5)
-        lower, upper = (float(f"{10 ** (step / ASPECT_STEPS):.7g}") for step in steps)
+        lower, upper = (ASPECT_STEPS_IN_DECADE * log10(end) for end in (first, last))
+        steps = floor(lower + 1e-5), ceil(upper - 1e-5)
+        lower, upper = (float(f"{10 ** (step / ASPECT_STEPS_IN_DECADE):.7g}") for step in steps)
         first, last = min(first, lower), max(last, upper)
     if least < largest:
         steps = floor(least / NU_STEP + 1e-6), ceil(largest / NU_STEP - 1e-6)
@@ -188,7 +189,7 @@ def _reference_code(*without):
     return stage_key("studies.kinds.bodies.reference", without=("studies.kinds.bodies.shape_reference", *without))
 
 
-OF_OTHERS = (
+NOT_OF_BEAMS = (
     "studies.kinds.bodies.task_values",
     *(f"reference.{name}" for name in ("small_strain", "shapes", "finite_shapes", "finite_strain")),
 )
@@ -243,7 +244,7 @@ def _scene_tasks(study, mesh, scenes):
     for scene in scenes:
         place = scene.material, scene.load, scene.definition, scene.kinematics
         if place not in shared:
-            shared[place] = _shared(study, mesh, *place)
+            shared[place] = _network_task(study, mesh, *place)
         task, key = shared[place]
         own = {"force": scene.force}
         if scene.definition == "paper":
@@ -260,7 +261,7 @@ def _scene_tasks(study, mesh, scenes):
         yield {**task, **own, **further, "key": hash_of(key, own)}
 
 
-def _shared(study, mesh, material, load, definition, kinematics):
+def _network_task(study, mesh, material, load, definition, kinematics):
     """Task, and its key, of scenes of a mesh that differ in force or stiffness alone."""
     task = {
         "material": material_key(material),
@@ -273,7 +274,7 @@ def _shared(study, mesh, material, load, definition, kinematics):
     reference = reference_of(study, mesh.beam, material, load)
     if "interpolant" not in reference:  # which has no field, all that a scene wants of it
         task["reference"] = reference
-    code = stage_key("studies.kinds.bodies.solve", without=OF_OTHERS), definition_key(definition)
+    code = stage_key("studies.kinds.bodies.solve", without=NOT_OF_BEAMS), definition_key(definition)
     return task, hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
 
 
@@ -300,7 +301,7 @@ def shown_scenes(study):
 def calibrating(study):
     """Curves that calibrate each group of scenes."""
     chosen = (one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration)
-    return _grouped(chosen, calibration_name)
+    return _group_by(chosen, calibration_name)
 
 
 def calibration_name(scene):
@@ -312,20 +313,20 @@ def calibration_name(scene):
 def calibrations(study):
     """Tasks of the groups of scenes that share a calibrated stiffness, all in one job and file."""
 
-    def named(curve):
+    def member(curve):
         place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
         return place | {"load": curve.load, "force": curve.force}
 
     code, found = stage_key("studies.kinds.bodies.calibrate"), {}
     for name in sorted({calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}):
-        members = [named(one) for one in calibrating(study)[name]]
-        found[name] = Task({"members": members}, name="all", file=CALIBRATION, key=hash_of(members, code))
+        members = [member(one) for one in calibrating(study)[name]]
+        found[name] = Task({"members": members}, name="all", file=CALIBRATION_STEM, key=hash_of(members, code))
     return found
 
 
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
-MOST_DRAWN = 1500
+MOST_PARTICLES_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
 
 FILE_PARTICLES = 2000.0
@@ -349,8 +350,8 @@ def shape_particles(study, one):
 def drawn_scenes(study):
     """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
     found = set()
-    for scenes in _grouped(study.shapes.scenes, attrgetter("shape", "load")).values():
-        few = [one for one in scenes if shape_particles(study, one) <= MOST_DRAWN]
+    for scenes in _group_by(study.shapes.scenes, attrgetter("shape", "load")).values():
+        few = [one for one in scenes if shape_particles(study, one) <= MOST_PARTICLES_DRAWN]
         size = attrgetter("mesh_size")
         mesh = min(few, key=size) if few else max(scenes, key=size)
         alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
@@ -376,16 +377,16 @@ def shape_mesh_source(study, one):
 
 def shape_mesh_key(study, one):
     """Key of the mesh of a scene."""
-    code = stage_key("studies.kinds.bodies.mesh"), _reader(study.shape(one.shape))
+    code = stage_key("studies.kinds.bodies.mesh"), _reader_key(study.shape(one.shape))
     return hash_of(parameters(shape_mesh_source(study, one)), *code)
 
 
-def _reader(shape):
+def _reader_key(shape):
     """Key of the code that reads the mesh file of a shape; empty without a file."""
-    return mesh_type_key(OWN_FILE) if shape.file else ""
+    return mesh_type_key(MESH_OF_FILE) if shape.file else ""
 
 
-def _case(study, shape, material, name):
+def _case_values(study, shape, material, name):
     """Thickness, load and materials of a scene; densities only under gravity."""
     from .task_values import load
 
@@ -398,19 +399,19 @@ def _case(study, shape, material, name):
 def shape_reference_task(study, shape, material, name, law=""):
     """Task of a reference of small strain, or of a law at finite strain."""
     body = study.shape(shape)
-    task = {"shape": shape_source(body)} | _case(study, shape, material, name) | ({"law": law} if law else {})
+    task = {"shape": shape_source(body)} | _case_values(study, shape, material, name) | ({"law": law} if law else {})
     without = () if law else WITHOUT_FINITE_STRAIN
-    code = stage_key("studies.kinds.bodies.shape_reference", attempts.MODULE, without=without), _reader(body)
+    code = stage_key("studies.kinds.bodies.shape_reference", attempts.MODULE, without=without), _reader_key(body)
     return {"key": hash_of(task | {"shape": parameters(task["shape"])}, code)} | task
 
 
 def shape_scene_task(study, one):
     """Task of a scene of a shape."""
     code = stage_key("studies.kinds.bodies.solve", without=WITHOUT_FINITE_STRAIN), definition_key(one.definition)
-    task = _case(study, one.shape, one.material, one.load)
+    task = _case_values(study, one.shape, one.material, one.load)
     task |= {"definition": one.definition, "kinematics": one.kinematics}
     key = hash_of(shape_mesh_key(study, one), task, code)
-    kept = DRAWING in study.outputs and one in drawn_scenes(study)
+    kept = SHAPES_OUTPUT in study.outputs and one in drawn_scenes(study)
     return {"key": key} | task | ({"keep_fields": True} if kept else {})
 
 

@@ -16,9 +16,9 @@ from . import unit_references
 
 failed = unit_references.failed
 
-NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
-OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
-OF_PLANE_STRAIN = "is in plane strain: its reference is 'neo-hooke-plane-strain'"
+WITHOUT_TEST = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
+WITH_TEST = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
+IN_PLANE_STRAIN = "is in plane strain: its reference is 'neo-hooke-plane-strain'"
 """Why a material has no reference of another law or plane."""
 
 
@@ -36,21 +36,21 @@ def solve(task):
     if "shape" in task:
         from .shape_reference import solve as solve_task  # here: most studies have no shapes
     else:
-        solve_task = _finite if "law" in task else unit_references.solve_unit_problem
+        solve_task = _solve_finite_strain if "law" in task else unit_references.solve_unit_problem
     return solve_task(task) | {"seconds": time.perf_counter() - begin}
 
 
-def _finite(task):
+def _solve_finite_strain(task):
     """Result at finite strain."""
     # Here, since few studies need it.
     from springtune.reference.finite_strain import FiniteStrainError, solve_finite_strain
 
     beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
     if material.plane == "strain" and task["plane"] == "stress":
-        return {"message": f"material {OF_PLANE_STRAIN}"}
+        return {"message": f"material {IN_PLANE_STRAIN}"}
     tested = isinstance(material, Rubber)
     if tested != (task["law"] == "yeoh"):
-        return {"message": f"material {OF_TESTED if tested else NOT_TESTED}"}
+        return {"message": f"material {WITH_TEST if tested else WITHOUT_TEST}"}
     try:
         solution = solve_finite_strain(beam, material, task["force"], kind, task["plane"], task["follower"])
     except FiniteStrainError as error:

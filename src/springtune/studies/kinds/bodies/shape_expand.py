@@ -20,7 +20,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import FEWER, check_able, check_density, check_particles
 from ...config.expand import FROM_THE_STUDY
-from .outputs import MADE, OWN_FILE
+from .outputs import GENERATED_MESH, MESH_OF_FILE
 
 
 @dataclass(frozen=True)
@@ -104,15 +104,15 @@ def expand(config, declared):
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
-            meshes = [(OWN_FILE, one.mesh_size) for one in shape.file or ()] or [
-                (MADE, size) for size in grid.mesh_size
+            meshes = [(MESH_OF_FILE, one.mesh_size) for one in shape.file or ()] or [
+                (GENERATED_MESH, size) for size in grid.mesh_size
             ]
             axes = meshes, grid.material, grid.load or shape.loads, grid.definition, grid.kinematics
             own = [ShapeScene(name, *mesh, *labels) for mesh, *labels in product(*axes)]
             found.update(own)
             referred.update(_case(one) for one in own if grid.reference)
             finite.update((*_case(one), one.law) for one in own if grid.finite_strain and one.law)
-    known = [*config.shapes], [MADE, OWN_FILE], [*config.materials], [*DEFINITIONS], [*KINEMATICS]
+    known = [*config.shapes], [GENERATED_MESH, MESH_OF_FILE], [*config.materials], [*DEFINITIONS], [*KINEMATICS]
 
     def order(one):
         labels = one.shape, one.mesh_type, one.material, one.definition, one.kinematics
@@ -139,13 +139,13 @@ def _case(one):
 
 MOST_SHAPE_SCENES = 100_000
 
-UNIT_NEEDED = 1.0
+UNIT_NEEDED_FROM_METRES = 1.0
 """Longer side [m] from which the unit of a mesh file has to be given, or there is a warning."""
 
-ONE_BODY = 0.1
+EXTENT_TOLERANCE = 0.1
 """Largest relative difference of the extents of meshes of one body: coarse ones cut off arcs."""
 
-READ_AT_ONCE = 1_000_000
+LARGEST_FILE_CHECKED = 1_000_000
 """Size of a mesh file up to which its groups are looked at as a study is read [B]."""
 
 
@@ -178,7 +178,7 @@ def _check_outline(name, shape, path, problems):
     for part in sorted(set(shape.parts) - parts):
         what = f"{nearest(part, parts)}; or give it to what fills a hole" if parts else "no hole has a 'part'; add it"
         problems.add((*path, "parts", part), f"unknown part '{part}'; {what}")
-    made = _made(name, shape, path, problems) if problems.nothing else None
+    made = _make_shape(name, shape, path, problems) if problems.nothing else None
     if made is None:
         return
     known = [*made.groups, *made.points, *made.parts]
@@ -199,7 +199,7 @@ def _check_outline(name, shape, path, problems):
             problems.add((*path, "loads", load, "supports"), message)
 
 
-def _made(name, shape, path, problems):
+def _make_shape(name, shape, path, problems):
     """Shape of a section; None where it is refused."""
     try:
         made = shape_of_config(name, shape, problems.folder)
@@ -214,20 +214,20 @@ def _made(name, shape, path, problems):
     return made
 
 
-ABOUT_A_LOAD = re.compile(r"load '([^']+)'(?:, (support|traction|pressure|quantity)(?: '([^']+)')?)?: (.*)", re.DOTALL)
+LOAD_MESSAGE = re.compile(r"load '([^']+)'(?:, (support|traction|pressure|quantity)(?: '([^']+)')?)?: (.*)", re.DOTALL)
 """Messages on a load: its name, the kind of what is wrong, the name of a quantity, and the rest."""
 
-KEYS = {"support": "supports", "traction": "forces", "pressure": "pressures", "quantity": "quantities"}
+LOAD_KEYS = {"support": "supports", "traction": "forces", "pressure": "pressures", "quantity": "quantities"}
 """Keys of a load's section by the kind of what messages are about."""
 
 
 def _add_fault(problems, path, message):
     """Add a message on the geometry or a load of a shape at its keys."""
     keys = ("outline",) if message.startswith("outline") else ("holes",) if message.startswith("hole") else ()
-    if found := ABOUT_A_LOAD.fullmatch(message):
+    if found := LOAD_MESSAGE.fullmatch(message):
         load, kind, quantity, message = found.groups()
         group = re.search("'([^']+)'", message) if kind else None
-        keys = "loads", load, *([KEYS[kind], quantity or group[1]] if kind else [])
+        keys = "loads", load, *([LOAD_KEYS[kind], quantity or group[1]] if kind else [])
     elif found := re.match(r"point '([^']+)'|'([^']+)' names a point", message):
         keys = "points", found[1] or found[2]
     elif found := re.match(r"(hole |outline, side )(\d+)\b", message):
@@ -237,7 +237,7 @@ def _add_fault(problems, path, message):
 
 def _check_file(name, shape, file, path, problems, extents):
     """Check the groups and the extents of a small mesh file; faults of large files show in their scenes."""
-    if file.stat().st_size > READ_AT_ONCE:
+    if file.stat().st_size > LARGEST_FILE_CHECKED:
         return
     # Here, since few studies have files, and reading one takes scipy.
     from springtune.mesh.formats import read_shape
@@ -250,11 +250,11 @@ def _check_file(name, shape, file, path, problems, extents):
         problems.add((*path, "file"), str(error))
         return
     sides = np.ptp(grouped.mesh.points, axis=0)
-    if max(sides) > UNIT_NEEDED and "unit" not in shape.model_fields_set:
+    if max(sides) > UNIT_NEEDED_FROM_METRES and "unit" not in shape.model_fields_set:
         message = f"shape '{name}': {size_text(*sides)}, since numbers in {file.name} are read in m; give their unit"
         warnings.warn(f"{message}, such as 'unit: 1 mm', or 'unit: 1 m'", AssumptionWarning, stacklevel=2)
     first, others = next(iter(extents.items()), (file.name, sides))
-    if not np.allclose(sides, others, rtol=ONE_BODY):
+    if not np.allclose(sides, others, rtol=EXTENT_TOLERANCE):
         message = (
             f"{file.name} is {size_text(*sides)}, and {first} {size_text(*others)}; give files of one body and unit"
         )
@@ -270,7 +270,7 @@ def _check_file(name, shape, file, path, problems, extents):
     for part in sorted(set(shape.parts) - set(grouped.parts)):
         there = nearest(part, grouped.parts) if grouped.parts else "the file has none"
         problems.add((*path, "parts", part), f"unknown part '{part}'; {there}")
-    made = _made(name, shape, path, problems)
+    made = _make_shape(name, shape, path, problems)
     for case in made.loads.values() if made else ():
         try:
             check_case(grouped, case)
@@ -293,7 +293,7 @@ def _check_stems(config, problems):
 
 
 def _check_grid(config, grid, path, problems):
-    check_able(problems, (*path, "definition"), grid.definition, [MADE])
+    check_able(problems, (*path, "definition"), grid.definition, [GENERATED_MESH])
     for name in grid.definition:
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")

@@ -8,28 +8,28 @@ from springtune.safe_io.escapes import no_mathematics
 from ...output import drawing, labels, style
 from ...output.dataset import STATUS
 from ...output.selection import cells, choose, group, labels_of
-from .outputs import DEFORMED, ERRORS, shape_figures
+from .outputs import DEFORMED_STEM, ERRORS_STEM, shape_figures
 
-NETWORK_COLUMNS = 3
+NETWORKS_IN_ROW = 3
 """Networks side by side."""
 
 MOST_NETWORKS = 6
 """Networks that are drawn where none are chosen."""
 
-FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
+SHOWN_FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
 """Definitions that are drawn before others."""
 
-REFERENCE = "reference to expected"
+REFERENCE_COLUMN = "reference to expected"
 """Column of the errors of references."""
 
-FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
+FORCE_COLOURS = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
 """Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""
 
 
 def shapes(tree):
     """Figures of shapes: all quantities; and of each shape and load its errors, and its networks."""
     data = group(tree, "shapes")
-    plots = {ERRORS: plot_shape_errors, DEFORMED: plot_shape}
+    plots = {ERRORS_STEM: plot_shape_errors, DEFORMED_STEM: plot_shape}
     for stem, selection in shape_figures(cells(data.status != 0, ("shape", "load"))).items():
         plot = next((plots[name] for name in plots if stem.startswith(name)), plot_shapes)
         yield stem, plot, selection
@@ -71,24 +71,24 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     >>> axes[0, 0].get_title(loc="left"), axes[0, 1].get_xlabel()
     ('tip: displacement y, tip', 'Seconds, springs and solve')
     """
-    cut, selection = _cut(data, shape, load, material, kinematics)
+    cut, selection = _select_case(data, shape, load, material, kinematics)
     names, definitions = _quantities(cut), labels_of(cut.status != 0, "definition")
     rows = max(1, len(names))
     tall = max(2.25, 0.72 + 0.16 * len(definitions))  # a line of names for each
     title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
-    points = {name: {one: _points(cut, name, one) for one in definitions} for name in names}
+    points = {name: {one: _points_of_line(cut, name, one) for one in definitions} for name in names}
     if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
     figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows))
     labels.entitle(figure, title)
     for panels, name in zip(axes, names):
-        _errors_of(panels, cut, name, points[name])
+        _draw_errors(panels, cut, name, points[name])
     for panel in axes.flat if not names else ():
         labels.say(panel, "No quantity was asked for.")
     return axes
 
 
-def _cut(data, shape, load, material, kinematics):
+def _select_case(data, shape, load, material, kinematics):
     """The cells of a shape under a load, of one material and kinematics, and their labels."""
     data = group(data, "shapes")
     present = data.status != 0
@@ -111,9 +111,9 @@ def described(cut, name):
     return {"area": "growth of the area", "energy": "strain energy"}.get(kind, f"{kind} {component}, {of}")
 
 
-def _points(cut, name, definition):
+def _points_of_line(cut, name, definition):
     """Particles, seconds, sizes of errors [%] and whether each counts, of one line, by particles."""
-    against = _against(cut, name)
+    against = _error_variable(cut, name)
     line = cut.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
     seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
     counted = (line.status.values == STATUS.index("solved")) & (int(cut.reference_applies.item()) != 0)
@@ -124,13 +124,13 @@ def _points(cut, name, definition):
     return [values[there] for values in kept]
 
 
-def _against(cut, name):
+def _error_variable(cut, name):
     """Variable that holds the errors of a quantity: those against the reference, if there is one."""
     there = np.isfinite(float(cut.reference_value.sel(quantity=name)))
     return "error" if there else "expected_error"
 
 
-def _errors_of(panels, cut, name, points):
+def _draw_errors(panels, cut, name, points):
     """Draw lines of a quantity over particles and over seconds, with names beside the latter."""
     one = cut.sel(quantity=name)
     estimate, difference = (
@@ -142,11 +142,11 @@ def _errors_of(panels, cut, name, points):
             panel.plot(along, errors, label=definition, **look)
             panel.plot(along[~counted], errors[~counted], **look | {"linestyle": "", "markerfacecolor": "white"})
     there = any(len(errors) for _, _, errors, _ in points.values())
-    against = "Error" if _against(cut, name) == "error" else "Difference to expected"
+    against = "Error" if _error_variable(cut, name) == "error" else "Difference to expected"
     for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
         panel.set(xlabel=words, ylabel=f"|{against}| [%]")
         if not there:
-            labels.say(panel, _why(cut))
+            labels.say(panel, _reason_without_error(cut))
             continue
         panel.set(xscale="log", yscale="log")
         low = panel.get_ylim()[0]
@@ -162,7 +162,7 @@ def _errors_of(panels, cut, name, points):
     panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL)
 
 
-def _why(cut):
+def _reason_without_error(cut):
     """Why there is no error."""
     states = drawing.in_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
@@ -202,10 +202,9 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     '|Error| on the finest mesh [%]'
     """
     whole = group(data, "shapes")
-    rows = _rows(whole, material, kinematics)
-    names = [
-        name for name in (*whole.definition.values.tolist(), REFERENCE) if any(name in row for row in rows.values())
-    ]
+    rows = _errors_by_quantity(whole, material, kinematics)
+    known = {name for row in rows.values() for name in row}
+    names = [name for name in (*whole.definition.values.tolist(), REFERENCE_COLUMN) if name in known]
     errors = np.array([[row.get(name, np.nan) for name in names] for row in rows.values()]).reshape(len(rows), -1)
     texts = [[drawing.NOT_ASKED if name not in row else
               drawing.error_text(row[name], "") if np.isfinite(row[name]) else drawing.NO_RESULT
@@ -224,12 +223,12 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     return panel
 
 
-def _rows(whole, material, kinematics):
+def _errors_by_quantity(whole, material, kinematics):
     """Errors on the finest mesh by quantity [%]: of definitions, NaN without a result, and of the reference."""
     found, asked = {}, whole.status != 0
     for place in cells(asked, ("shape", "load")):
         try:
-            cut, _ = _cut(whole, *place.values(), material, kinematics)
+            cut, _ = _select_case(whole, *place.values(), material, kinematics)
         except ValueError:  # not of this material or kinematics
             continue
         several = len(labels_of(asked.sel(shape=place["shape"]), "load")) > 1
@@ -238,11 +237,11 @@ def _rows(whole, material, kinematics):
         for name in _quantities(cut):
             row = found[f"{where}: {name}"] = {}
             for definition in labels_of(cut.status != 0, "definition"):
-                particles, _, sizes, counted = _points(cut, name, definition)
+                particles, _, sizes, counted = _points_of_line(cut, name, definition)
                 there = len(sizes) and counted[-1] and particles[-1] == finest
                 row[definition] = sizes[-1] if there else np.nan
             reference = 100 * abs(float(cut.reference_expected_error.sel(quantity=name)))
-            row |= {REFERENCE: reference} if reference > 0 else {}
+            row |= {REFERENCE_COLUMN: reference} if reference > 0 else {}
     return found
 
 
@@ -295,13 +294,13 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     mesh = {"mesh_type": str(case.mesh_type_name.item()), "mesh_size": float(case.case_mesh_size)}
     cut = scenes.sel(about | mesh)
     asked = labels_of(cut.status != 0, "definition")
-    wanted = _few(cut, asked) if definition is None else [definition] if isinstance(definition, str) else definition
+    wanted = [definition] if isinstance(definition, str) else definition or _choose_definitions(cut, asked)
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
     places = np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")])
     width, height = drawing.extent(places, (1.0, 1.0))
-    columns = min(NETWORK_COLUMNS, len(wanted))
+    columns = min(NETWORKS_IN_ROW, len(wanted))
     wide = (style.COLUMN if columns == 1 else style.PAGE) / columns - 0.5
     tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
     networks = case.reindex(definition=wanted)
@@ -315,9 +314,9 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     shown = {name: (networks.sel(definition=name), cut.sel(definition=name)) for name in wanted}
 
     def draw(panel, part):
-        return _network(panel, *part, scale, most), ""
+        return _draw_network(panel, *part, scale, most), ""
 
-    flat = labels.small_multiples(ax, shown, NETWORK_COLUMNS, tall, ", ".join(said), draw, said=below)
+    flat = labels.small_multiples(ax, shown, NETWORKS_IN_ROW, tall, ", ".join(said), draw, said=below)
     lines = [one for panel in flat for one in panel.collections]
     if lines and flat[0].figure.get_layout_engine():
         bar = flat[0].figure.colorbar(lines[0], ax=flat.tolist(), location="bottom", extend="both", aspect=50,
@@ -327,10 +326,10 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     return flat
 
 
-def _few(cut, asked):
-    """Definitions to draw: solved ones before others, and `FIRST` before the rest."""
+def _choose_definitions(cut, asked):
+    """Definitions to draw: solved ones before others, and `SHOWN_FIRST` before the rest."""
     solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
-    order = sorted(asked, key=lambda name: (not solved[name], name not in FIRST))
+    order = sorted(asked, key=lambda name: (not solved[name], name not in SHOWN_FIRST))
     return [name for name in asked if name in order[:MOST_NETWORKS]]
 
 
@@ -340,9 +339,9 @@ def _largest_force(networks):
     return float(np.nanquantile(forces, 0.97)) if np.nanmax(forces, initial=0.0) > 0 else 1.0
 
 
-def _network(panel, one, state, scale, most):
+def _draw_network(panel, one, state, scale, most):
     """Draw one network; return notes."""
-    lines = drawing.draw_network(panel, one, scale, most, FORCES)
+    lines = drawing.draw_network(panel, one, scale, most, FORCE_COLOURS)
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
     notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []

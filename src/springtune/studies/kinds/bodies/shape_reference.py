@@ -9,9 +9,9 @@ from springtune.mesh.sheets import outline_of, rounds
 from springtune.problem.materials import of_parts
 from springtune.reference.shapes import solve_each
 
-from .task_values import ONE_LOAD, by_key, make_shape, materials_of, quantity_key, shape_of
+from .task_values import LOAD_NAME, make_shape, materials_of, quantity_key, shape_of, values_by_key
 
-ALONG = 24
+POINTS_ALONG_SIDE = 24
 """Points along a side of an outline that is drawn."""
 
 
@@ -28,14 +28,14 @@ def solve(task):
         materials = of_parts(materials, parts_of(grouped)) if grouped else materials
     except ValueError as error:  # of a file that is too large to be checked before
         return {"message": str(error)}
-    case = shape.loads[ONE_LOAD]
+    case = shape.loads[LOAD_NAME]
     found, lacking = solve_each(shape, case, materials, grouped, solver)
     if not found:
         return {"message": "; ".join(dict.fromkeys(lacking.values()))}
     values, estimates = {}, {}
     for one in found:
-        values |= by_key(one.values, case)
-        estimates |= by_key(one.error_estimates, case)
+        values |= values_by_key(one.values, case)
+        estimates |= values_by_key(one.error_estimates, case)
     outlines = _outlines(shape, grouped)
     points = np.concatenate(outlines)
     return {
@@ -57,6 +57,7 @@ def _outlines(shape, grouped):
     """Points around the outline and around each hole [m]."""
     if grouped is None:
         outer = [one.sides for one in shape.rounds if one.inner is None or one.outer is None]
-        return [np.array([side.at(i / ALONG) for side in sides for i in range(ALONG)]) for sides in outer]
+        shares = [number / POINTS_ALONG_SIDE for number in range(POINTS_ALONG_SIDE)]
+        return [np.array([side.at(share) for side in sides for share in shares]) for sides in outer]
     mesh = grouped.mesh
     return [mesh.points[one] for one in rounds(outline_of(mesh)[0])]

@@ -21,7 +21,7 @@ QUANTITIES = {
 """Dimension of each quantity of interest, and the keys for its place with what they name."""
 
 
-def both(kind: str) -> Any:
+def pair_field(kind: str) -> Any:
     """Note of two quantities, along x and along y."""
     example = units.QUANTITY_KINDS[kind].example
     pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
@@ -32,9 +32,9 @@ Displacement = Annotated[float, *quantity("length", signed=True)]
 PressureValue = Annotated[float, *quantity("stress", signed=True)]
 SignedForce = Annotated[float, *quantity("force", signed=True)]
 Acceleration = Annotated[float, *quantity("acceleration", signed=True)]
-Place = Annotated[tuple[Displacement, Displacement], both("length")]
-ForceVector = Annotated[tuple[SignedForce, SignedForce], both("force")]
-Gravity = Annotated[tuple[Acceleration, Acceleration], both("acceleration")]
+Place = Annotated[tuple[Displacement, Displacement], pair_field("length")]
+ForceVector = Annotated[tuple[SignedForce, SignedForce], pair_field("force")]
+Gravity = Annotated[tuple[Acceleration, Acceleration], pair_field("acceleration")]
 GroupName = Annotated[str, Field(min_length=1, title="the name of a group")]
 PointName = Annotated[str, Field(min_length=1, title="the name of a point")]
 PartName = Annotated[str, Field(min_length=1, title="the name of a part")]
@@ -45,7 +45,7 @@ StressComponent = Annotated[str, *one_of("component", ("xx", "yy", "xy"))]
 Anything = Annotated[str, WithJsonSchema({"type": ["string", "number"]}), Field(title="a value with its unit")]
 
 
-def _or_text(*texts: str) -> Any:
+def _allow_text(*texts: str) -> Any:
     """Schema of a section that may be given as a text."""
 
     def extend(schema: dict[str, Any]) -> None:
@@ -109,7 +109,7 @@ class HoleConfig(Section):
 class SupportConfig(Section):
     """Prescribed displacements; `fixed` is zero along both axes."""
 
-    model_config = {"json_schema_extra": _or_text("fixed")}
+    model_config = {"json_schema_extra": _allow_text("fixed")}
 
     x: Displacement | None = None
     """Along x; free by default."""
@@ -136,7 +136,7 @@ class SupportConfig(Section):
 class PressureConfig(Section):
     """A pressure on a group, positive towards the body. A stress alone keeps its direction."""
 
-    model_config = {"json_schema_extra": _or_text()}
+    model_config = {"json_schema_extra": _allow_text()}
 
     pressure: PressureValue
     """Pressure."""
@@ -153,7 +153,7 @@ class PressureConfig(Section):
 class QuantityConfig(Section):
     """A quantity of interest: one of `displacement`, `stress`, `reaction`, or the text `area` or `energy`."""
 
-    model_config = {"json_schema_extra": _or_text("area", "energy")}
+    model_config = {"json_schema_extra": _allow_text("area", "energy")}
 
     displacement: Axis | None = None
     """Displacement `at` a point, or the mean `of` a group."""
@@ -270,7 +270,7 @@ def _files(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
     return files
 
 
-def _or_path(schema: dict[str, Any]) -> None:
+def _allow_path(schema: dict[str, Any]) -> None:
     array = {key: schema.pop(key) for key in ("type", "items", "minItems")}
     schema["anyOf"] = [{"type": "string", "minLength": 1}, array]
 
@@ -288,7 +288,8 @@ class ShapeConfig(Section):
     """Holes, and parts of other materials."""
 
     file: (
-        Annotated[list[ShapeFileConfig], Field(min_length=1, json_schema_extra=_or_path), WrapValidator(_files)] | None
+        Annotated[list[ShapeFileConfig], Field(min_length=1, json_schema_extra=_allow_path), WrapValidator(_files)]
+        | None
     ) = Field(None, title="the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
     """Mesh file with groups, instead of an outline; or several with their mesh sizes: the reference uses the finest."""
 

@@ -45,14 +45,14 @@ def prepare(file, content):
     mesh, labels = grouped.mesh, ("x", "y", "displacements")
 
     @cache
-    def for_one(key, length):
+    def unit_displacements(key, length):
         """Displacements for 1 N of a material that moves by 1 m; None where the reference has none."""
         scales = {"key": key, "length": length, "displacement": 1.0}
         found = stored.read_reference(Path(content["results"]) / "references", scales, labels)
         return interpolate(*(found[label] for label in labels), mesh.points) if "x" in found else None
 
     def field(reference):
-        unit = for_one(reference["key"], reference["length"])
+        unit = unit_displacements(reference["key"], reference["length"])
         return None if unit is None else reference["displacement"] * unit
 
     beam = Beam(*file["beam"])
@@ -81,7 +81,7 @@ def solve(task, solve_one):
         return failed(task, f"{task['definition']}: {error}") | {"seconds": time.perf_counter() - begin}
 
 
-def _solved(about, springs, seconds, task):
+def _solve_problem(about, springs, seconds, task):
     """Equilibrium of a scene, with what is stored of each scene, and the arrays of one that is drawn."""
     begin = time.perf_counter()
     found = about.solve(springs)
@@ -119,7 +119,7 @@ def solve_beam(beam, sheet, field, task):
     springs = replace(springs, reference=task.get("stiffness_scale", 1) * springs.reference)
     load = Load(kind, copysign(1, force), task["follower"])
     about = BeamProblem(beam, sheet.mesh, material, load, abs(force), kinematics, sheet)
-    solution, result = _solved(about, springs, seconds, task)
+    solution, result = _solve_problem(about, springs, seconds, task)
     found = solution.equilibrium
     result |= {
         "iterations": found.iterations,
@@ -135,13 +135,13 @@ def solve_beam(beam, sheet, field, task):
         return result | last
     result["displacement"] = solution.displacement
     if kind.pressed:
-        result |= _face(sheet, kind, found.displacements)
+        result |= _pressed_face(sheet, kind, found.displacements)
     if wanted is not None:
         result["field_error"] = field_error(sheet.mesh, found.displacements, force * wanted)
     return result
 
 
-def _face(sheet, kind, displacements):
+def _pressed_face(sheet, kind, displacements):
     """Mean displacement of a pressed face and its profile, along the force [m]."""
     weights = sheet.weights(kind)
     face = np.flatnonzero(weights[:, kind.axis] > 0)
@@ -156,20 +156,20 @@ def solve_shape(described, grouped, sheets, task):
 
     ``sheets`` are those of the mesh by thickness, which scenes add.
     """
-    from .task_values import ONE_LOAD, by_key, materials_of, shape_of  # here: most studies have no shapes
+    from .task_values import LOAD_NAME, materials_of, shape_of, values_by_key  # here: most studies have no shapes
 
     shape = shape_of(described, task["thickness"], task["load"])
-    case, materials, kinematics = shape.loads[ONE_LOAD], materials_of(task["materials"]), task["kinematics"]
+    case, materials, kinematics = shape.loads[LOAD_NAME], materials_of(task["materials"]), task["kinematics"]
     definition, sheet = definition_of(task["definition"]), sheets.get(shape.thickness)
     try:
         check_case(grouped, case)
-        about = ShapeProblem(shape, grouped, materials, ONE_LOAD, 1.0, kinematics, sheet)
+        about = ShapeProblem(shape, grouped, materials, LOAD_NAME, 1.0, kinematics, sheet)
         about.check(definition)
         sheets[shape.thickness] = about.sheet
         with named(definition):
             springs, seconds = about.springs(definition, None)
-        solution, result = _solved(about, springs, seconds, task)
+        solution, result = _solve_problem(about, springs, seconds, task)
     # Loads on what is held, quantities that the mesh has not, definitions that refuse it; mechanisms.
     except (ValueError, SingularError) as error:
         return failed(task, str(error))
-    return result | {"values": by_key(about.values(springs, solution), case)}
+    return result | {"values": values_by_key(about.values(springs, solution), case)}

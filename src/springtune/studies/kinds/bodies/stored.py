@@ -38,7 +38,7 @@ def check_unchanged(source: dict[str, Any]) -> None:
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
 
 
-NOTES = "notes"
+NOTES_KEY = "notes"
 """Key of the only result of a mesh's file, which has the key of the mesh itself."""
 
 
@@ -55,11 +55,11 @@ def write(folder: str | Path, name: str, key: str, made: GroupedMesh | None, kno
         path.unlink(missing_ok=True)
     else:
         write_mesh(path, made.mesh)
-        known |= {"checksum": checksum(path), "groups": _plain(made)}
-    store.add(notes, {NOTES: {"key": key, **known}})
+        known |= {"checksum": checksum(path), "groups": _groups_as_lists(made)}
+    store.add(notes, {NOTES_KEY: {"key": key, **known}})
 
 
-def _plain(grouped: GroupedMesh) -> dict[str, Any]:
+def _groups_as_lists(grouped: GroupedMesh) -> dict[str, Any]:
     """Groups of a mesh: edges of sides, coordinates of points, and numbers of the cells of parts."""
     return {
         "sides": {name: edges.tolist() for name, edges in grouped.sides.items()},
@@ -75,7 +75,7 @@ def _plain(grouped: GroupedMesh) -> dict[str, Any]:
 def is_stored(folder: str | Path, name: str, key: str) -> bool:
     """Whether a mesh, or the reason why it cannot be made, is stored."""
     path, notes = files(folder, name)
-    if NOTES not in store.stored(notes):
+    if NOTES_KEY not in store.stored(notes):
         return False
     known = read_notes(folder, name)
     return bool(known["key"] == key and ("message" in known or path.exists()))
@@ -83,7 +83,7 @@ def is_stored(folder: str | Path, name: str, key: str) -> bool:
 
 def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     """Notes of a mesh: its ``key``, ``checksum``, seconds and quality."""
-    return store.read(files(folder, name)[1], [NOTES])[NOTES]
+    return store.read(files(folder, name)[1], [NOTES_KEY])[NOTES_KEY]
 
 
 def prepared(content: dict[str, Any], file: dict[str, Any]) -> GroupedMesh:
@@ -142,13 +142,13 @@ FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_force
 """Arrays of all particles and springs, and their types."""
 
 
-CALIBRATION = "calibration"
+CALIBRATION_STEM = "calibration"
 """Stem of the file of calibrated stiffnesses, among the curves."""
 
 
 def read_calibration(folder: str | Path) -> dict[str, Any]:
     """Calibrated stiffnesses of a study [N/m] by key; none where nothing is calibrated."""
-    path = Path(folder) / "curves" / f"{CALIBRATION}.h5"
+    path = Path(folder) / "curves" / f"{CALIBRATION_STEM}.h5"
     return store.everything(path) if path.exists() else {}
 
 

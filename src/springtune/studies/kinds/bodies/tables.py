@@ -10,19 +10,19 @@ from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head
 from ...output.selection import cells, group, labels_of, listed, of_own_law, own_laws, records
 from ...output.text import decimals, number
-from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE, stem
+from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
 
 
 def tables(tree):
     """Tables of the page: the paper's, those of references at finite strain and of pressed faces, and of shapes."""
-    shapes = [_shapes(tree)] if "shapes" in tree else []
+    shapes = [_shape_table(tree)] if "shapes" in tree else []
     root = tree.to_dataset()
     if "status" not in root:  # a study without scenes
         return shapes
     own = like_with_like(tree)
-    found = [_table(own.sel(selection), selection) for selection in cells(own.status != 0, TABLE)]
+    found = [_scene_table(own.sel(selection), selection) for selection in cells(own.status != 0, TABLE_LABELS)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
-    groups = {"finite_strain": _finite_strain, "block": _block}
+    groups = {"finite_strain": _finite_strain_table, "block": _block_table}
     return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree] + shapes
 
 
@@ -43,7 +43,7 @@ def like_with_like(data):
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
-NETWORK = {
+NETWORK_COLUMNS = {
     "printed_stiffness_N_per_m": ("paper_stiffness", 1),
     "printed_reference_mm": ("paper_reference_displacement", 1e3),
     "printed_displacement_mm": ("paper_displacement", 1e3),
@@ -61,18 +61,20 @@ NETWORK = {
 """Columns of a network: variable and factor."""
 
 
-def _swept(dimensions):
+def _swept_columns(dimensions):
     """Swept parameters and their units, by column."""
     return {column: (name, unit) for name, (_, column, unit) in SWEPT_SHOWN.items() if name in dimensions}
 
 
-def _table(data, selection):
+def _scene_table(data, selection):
     """Table of the scenes of a load, mesh type and material."""
     numbers = np.unique(data.paper_table.values[np.isfinite(data.paper_table.values)])
     number = int(numbers[0]) if len(numbers) == 1 else None
     swept = [name for name in SWEPT if name in data.status.dims]
     sign = LOADS[selection["load"]].sign if "force" in swept else 1.0
-    columns = {"mesh_size_mm": ("mesh_size", 1e3)} | _swept(swept) | {"force_N": ("force", sign)} | NETWORK
+    columns = (
+        {"mesh_size_mm": ("mesh_size", 1e3)} | _swept_columns(swept) | {"force_N": ("force", sign)} | NETWORK_COLUMNS
+    )
     present = (data.status != 0).transpose("beam", "mesh_size", *swept, "kinematics", "definition")
     rows = listed(data, present, ("beam", "kinematics", "definition"), columns)
     words = {-1: "unknown", 0: "no", 1: "yes"}
@@ -80,16 +82,16 @@ def _table(data, selection):
         row |= {"status": STATUS[row["status"]], "reference_applies": words[int(row["reference_applies"])]}
     title = f"{selection['load']}, {selection['mesh_type']} mesh, {selection['material']}"
     found = {"stem": stem(selection, number), "title": f"Table {number}: {title}" if number else title}
-    further = [column for column in _swept(swept) if column != "force_N"]
-    shown = _shown(rows, labels_of(present, "definition"), further, "finite_strain" in data.attrs)
+    further = [column for column in _swept_columns(swept) if column != "force_N"]
+    shown = _page_cells(rows, labels_of(present, "definition"), further, "finite_strain" in data.attrs)
     return found | {"number": number, "rows": rows, "note": _stiffnesses(rows)} | shown
 
 
-ANSWERED = {"solved": "", "unstable": "u", "linear_only": "l"}
+STATUS_MARKS = {"solved": "", "unstable": "u", "linear_only": "l"}
 """Marks of networks with a displacement, by status."""
 
 
-def _shown(rows, definitions, swept, finite):
+def _page_cells(rows, definitions, swept, finite):
     """Cells of the page: a line for each mesh, load and kinematics, two columns a definition; marks, and remarks."""
     data = pd.DataFrame(rows)
     length = decimals(data[["network_mm", "reference_mm"]].to_numpy().ravel())
@@ -110,11 +112,11 @@ def _shown(rows, definitions, swept, finite):
         own += "" if row["reference_applies"] == "yes" else "r"
         line["", "Reference [mm]"] = number(row["reference_mm"], length) + own
         line["", "Kinematics"] = row["kinematics"]
-        answered = status in ANSWERED and np.isfinite(row["network_mm"])  # beyond a limit point there is none
-        text = number(row["network_mm"], length) + ANSWERED[status] if answered else status.replace("_", " ")
+        answered = status in STATUS_MARKS and np.isfinite(row["network_mm"])  # beyond a limit point there is none
+        text = number(row["network_mm"], length) + STATUS_MARKS[status] if answered else status.replace("_", " ")
         line[row["definition"], "[mm]"] = text
         line[row["definition"], "error [%]"] = number(row["error_percent"], percent, sign=True) if answered else ""
-        marks |= {*own, *(ANSWERED[status] if answered else ""), *("*" if row["remark"] else "")}
+        marks |= {*own, *(STATUS_MARKS[status] if answered else ""), *("*" if row["remark"] else "")}
         said = {f"* {beam}, {size} mm": row["remark"], text: "" if answered else row["message"]}
         said[f"r {beam}, {row['kinematics']}"] = row["reference_message"] if "r" in own else ""
         remarks |= {f"{what}: {why}": None for what, why in said.items() if why}
@@ -137,13 +139,13 @@ def _stiffnesses(rows):
 
 def _rows(data, present, order, network, reference, error):
     """Rows of networks beside references, from present cells."""
-    columns = _swept(present.dims) | {"mesh_size_mm": ("mesh_size", 1e3), "network_mm": (network, 1e3)}
+    columns = _swept_columns(present.dims) | {"mesh_size_mm": ("mesh_size", 1e3), "network_mm": (network, 1e3)}
     columns |= {"reference_mm": (reference, 1e3), "error_percent": (error, 100)}
     names = ("beam", "material", "load", "mesh_type", "definition", "kinematics", "reference")
     return listed(data, present.transpose(*order, ...), names, columns)
 
 
-def _finite_strain(finite, root):
+def _finite_strain_table(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
     _, finite = own_laws(finite)
     finite = finite.assign(displacement=root.displacement)
@@ -160,7 +162,7 @@ def _finite_strain(finite, root):
     return {"stem": "finite_strain", "title": "Against references at finite strain", "note": note, "rows": rows}
 
 
-def _block(block, root):
+def _block_table(block, root):
     """Middle of the pressed face: linear networks against small strain, others against finite strain if it is there."""
     _, block = own_laws(block)
     order = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
@@ -181,7 +183,7 @@ SHAPE_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "mater
 SHAPE_ERRORS = ("error", "expected_error", "reference_error_estimate")
 
 
-def _shapes(tree):
+def _shape_table(tree):
     """Table of the quantities of shapes."""
     data = tree["shapes"].to_dataset()
     present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")

@@ -15,7 +15,7 @@ from springtune.problem.shapes import LoadCase, Quantity, Shape
 
 from .stored import check_unchanged
 
-UNNAMED, ONE_LOAD = "shape", "load"
+SHAPE_NAME, LOAD_NAME = "shape", "load"
 """Names of a shape and of its load in tasks."""
 
 
@@ -46,20 +46,20 @@ def load(case: LoadCase) -> dict[str, Any]:
         replace(one, name=f"q{number}", expected=None, source="")
         for number, (_, one) in enumerate(sorted(quantities.items()))
     ]
-    return asdict(replace(case, name=ONE_LOAD, quantities=tuple(plain)))
+    return asdict(replace(case, name=LOAD_NAME, quantities=tuple(plain)))
 
 
-_SHAPE = TypeAdapter(Shape)
+_SHAPE_READER = TypeAdapter(Shape)
 """Reader of what `asdict` makes of a shape."""
 
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
     """Shape from its `geometry` and thickness [m]."""
     own = {name: described[name] for name in ("outline", "holes", "points")}
-    own |= {"name": UNNAMED, "thickness": thickness, "file": described.get("file", "")}
+    own |= {"name": SHAPE_NAME, "thickness": thickness, "file": described.get("file", "")}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
-        return _SHAPE.validate_python(own | {"loads": {ONE_LOAD: case} if case else {}})
+        return _SHAPE_READER.validate_python(own | {"loads": {LOAD_NAME: case} if case else {}})
 
 
 def make_shape(source: dict[str, Any]) -> GroupedMesh:
@@ -72,15 +72,15 @@ def make_shape(source: dict[str, Any]) -> GroupedMesh:
     return mesh_shape(shape_of(source), source["mesh_size"], source["refined"])
 
 
-def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
+def values_by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
     """Finite values of quantities by their `quantity_key`."""
     found = {quantity_key(one): float(values[one.name]) for one in case.quantities if one.name in values}
     return {key: value for key, value in found.items() if isfinite(value)}
 
 
-def named(message: str, shape: Shape, case: LoadCase) -> str:
+def with_names(message: str, shape: Shape, case: LoadCase) -> str:
     """Message of a task with the names of the study."""
-    names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{ONE_LOAD}'": f"load '{case.name}'"}
+    names = {f"shape '{SHAPE_NAME}'": f"shape '{shape.name}'", f"load '{LOAD_NAME}'": f"load '{case.name}'"}
     order = sorted({quantity_key(one) for one in case.quantities})
     names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}
     for plain, name in names.items():

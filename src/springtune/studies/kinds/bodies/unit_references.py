@@ -25,7 +25,7 @@ def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> 
     """Build a missing interpolant; if it meets no tolerance, solve its unit problems one by one."""
     if task["key"] not in store.stored(path):
         begin = time.perf_counter()
-        result = attempts.attempt(task["key"], partial(_built, task), partial(failed, task))
+        result = attempts.attempt(task["key"], partial(_build_interpolant, task), partial(failed, task))
         if result is None:
             return
         result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
@@ -46,7 +46,7 @@ def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> 
             keeper[key] = result | {"seconds": time.perf_counter() - begin}
 
 
-def _built(task: dict[str, Any]) -> dict[str, Any]:
+def _build_interpolant(task: dict[str, Any]) -> dict[str, Any]:
     """Interpolant within its own tolerance or that of references, else the reason."""
     # Here, since few studies need it.
     from springtune.reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError

@@ -26,8 +26,8 @@ DIMENSIONS = {"MESH": MESH, "REFERENCE": REFERENCE, "CELL": CELL, "CURVE": CURVE
 DIMENSIONS |= {"SHAPE_MESH": MESH_AXES, "SHAPE_CASE": CASE_AXES, "SHAPE_SCENE": SCENE_AXES}
 """Dimensions that the file gives one name."""
 
-EMPTY: dict[str, float | str | np.number[Any]] = {"": np.nan, "text": "", "0": 0, "-1": -1}
-EMPTY |= {"float32": np.float32(np.nan), "int32": np.int32(0), "no node": NO_NODE}
+EMPTY_VALUES: dict[str, float | str | np.number[Any]] = {"": np.nan, "text": "", "0": 0, "-1": -1}
+EMPTY_VALUES |= {"float32": np.float32(np.nan), "int32": np.int32(0), "no node": NO_NODE}
 """Values of empty cells by their names in the file."""
 
 
@@ -38,12 +38,14 @@ def declared(group: str, **options: Any) -> Group:
     variables = {}
     for row in rows:
         dimensions = tuple(name for word in row["dimensions"].split() for name in DIMENSIONS.get(word, (word,)))
-        variables[row["name"]] = dimensions, row["units"], row["long_name"], EMPTY[row["empty"]]
+        variables[row["name"]] = dimensions, row["units"], row["long_name"], EMPTY_VALUES[row["empty"]]
     return Group(group, variables, **options)
 
 
 YES_OR_NO = {"applies": ("no", "yes")}
-OF_MESHES = UGRID | dict.fromkeys(("displacement_x", "displacement_y"), OF_PARTICLES) | {"spring_force": OF_SPRINGS}
+MESH_ATTRIBUTES = (
+    UGRID | dict.fromkeys(("displacement_x", "displacement_y"), OF_PARTICLES) | {"spring_force": OF_SPRINGS}
+)
 KIND_OF_REFERENCE = {"reference": "kind of reference"}
 
 ROOT = declared("/", flags=YES_OR_NO)
@@ -52,7 +54,7 @@ FINITE_STRAIN = declared("/finite_strain", dimensions=KIND_OF_REFERENCE)
 BLOCK = declared("/block", dimensions=KIND_OF_REFERENCE | {"face_position": "place on the loaded face over its length"})
 FIELDS = declared(
     "/fields",
-    further=OF_MESHES
+    further=MESH_ATTRIBUTES
     | dict.fromkeys(("particle_reference_x", "particle_reference_y"), OF_PARTICLES)
     | {"stiffness": OF_SPRINGS},
 )
@@ -62,24 +64,27 @@ Each selected mesh follows UGRID-1.0 without the padding of its arrays, see `spr
 The force of springs is not called "force", a dimension of the root where a study sweeps it.
 """
 
-MIXED: dict[str, object] = {"comment": "in SI units: quantity_units says which", "units_variable": "quantity_units"}
+MIXED_UNITS: dict[str, object] = {
+    "comment": "in SI units: quantity_units says which",
+    "units_variable": "quantity_units",
+}
 
 SHAPES = declared(
     "/shapes",
     dimensions={"shape": "shape, by name", "quantity": "quantity of interest, by name"},
     flags=YES_OR_NO,
-    further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED),
+    further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED_UNITS),
 )
 AT_FINITE_STRAIN = declared(
     "/shapes_finite_strain",
     dimensions=SHAPES.dimensions
     | {"law": "law at finite strain: that of the material, or of St. Venant and Kirchhoff"},
-    further={"reference_value": MIXED},
+    further={"reference_value": MIXED_UNITS},
 )
-SHAPE_FIELDS = declared("/shape_fields", dimensions={"case": "shape and load"}, further=OF_MESHES)
+SHAPE_FIELDS = declared("/shape_fields", dimensions={"case": "shape and load"}, further=MESH_ATTRIBUTES)
 """Networks to draw: of each shape and load on one mesh, displacements and forces with seven digits."""
 
-OF_PRINT = "paper_"
+PRINTED_PREFIX = "paper_"
 """Prefix of variables of printed cells, which have no swept dimensions."""
 
 
@@ -89,7 +94,7 @@ def swept(group: Group, study: "Study") -> Group:
     for name, (dimensions, *_) in group.variables.items():
         if name in OF_BODIES.values():
             further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
-        elif "load" in dimensions and not name.startswith(OF_PRINT):
+        elif "load" in dimensions and not name.startswith(PRINTED_PREFIX):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
     found = group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
     if group in (ROOT, FINITE_STRAIN, BLOCK) and study.plane_strain:
