@@ -67,9 +67,9 @@ __all__ = ["__version__", *sorted(_PLACES)]  # noqa: PLE0604
 def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from .registry import imported
+    from .registry import import_name
 
-    return imported(f"{_PLACES[name]}:{name}")
+    return import_name(f"{_PLACES[name]}:{name}")
 
 
 def __dir__() -> list[str]:

@@ -59,7 +59,7 @@ def plugin_packages() -> set[str]:
     return {one.module.partition(".")[0] for group in plugins().values() for one in group}
 
 
-def imported(name: str) -> Any:
+def import_name(name: str) -> Any:
     """Import a module of the package, or with ``module:name`` an attribute of it.
 
     All imports by text use this function: commands, study kinds, stages, outputs, public names and hooks.
@@ -71,11 +71,11 @@ def imported(name: str) -> Any:
 
 def hook(name: str) -> Any:
     """Module of `HOOKS`."""
-    return imported(HOOKS[name])
+    return import_name(HOOKS[name])
 
 
 @dataclass(frozen=True, eq=False)
-class Declared:
+class Declaration:
     """Function with its name in studies; entries are sorted by `order`, then by name."""
 
     name: str
@@ -106,10 +106,10 @@ NAME_RULE = (
 
 
 Entry = TypeVar("Entry")
-Function = TypeVar("Function", bound=Declared)
+Function = TypeVar("Function", bound=Declaration)
 
 
-class Extended(Mapping[str, Entry]):
+class ExtensibleMapping(Mapping[str, Entry]):
     """Read-only ordered mapping of the package's entries and of those that other packages declare by entry points.
 
     `adopt` checks an imported object and returns the entry. What it refuses, or what cannot be imported, is left out
@@ -177,7 +177,7 @@ class Extended(Mapping[str, Entry]):
         return f"<{self._what}s: {', '.join(self)}>"
 
 
-class Registry(Extended[Function]):
+class Registry(ExtensibleMapping[Function]):
     """Mapping of declared functions; imports the package's modules when needed."""
 
     def __init__(self, package: str, what: str, group: str):

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import springtune
 from counting import counted
-from springtune.cli import COMMANDS, Shown, main
+from springtune.cli import COMMANDS, EscapedStream, main
 from springtune.handover.formats import NET_FORMATS
 from springtune.mesh import MESH_TYPES, write_mesh
 from springtune.mesh.types import MeshType
@@ -350,6 +350,6 @@ class TestPredictAMesh:
 
 def test_no_way_of_writing_leaves_control_characters():
     stream = io.StringIO()
-    Shown(stream).writelines(["red \x1b[31m\n"])
+    EscapedStream(stream).writelines(["red \x1b[31m\n"])
     assert stream.getvalue() == "red \\x1b[31m\n"
-    assert not hasattr(Shown(sys.stdout), "buffer")
+    assert not hasattr(EscapedStream(sys.stdout), "buffer")

@@ -65,7 +65,7 @@ class Run(Campaign):
     def do_stage(self, name):
         """A job of a stage, in this process, which compiles once what it needs."""
         note = json.loads(self.bundles[name].tasks.read_text())
-        computed = attempts.do(note["module"], note["content"])
+        computed = attempts.do_tasks(note["module"], note["content"])
         self.jobs[name].record.parent.mkdir(parents=True, exist_ok=True)
         self.jobs[name].record.write_text(json.dumps({"digest": note["digest"], "computed": computed}))
 

@@ -33,7 +33,7 @@ def do_stages(study, folder, *stages):
     """Run the jobs of a study, or of some of its stages, and assert that no task is broken."""
     for one in plan(study, folder).values():
         if not stages or one.stage.name in stages:
-            attempts.do(one.stage.module, one.content)
+            attempts.do_tasks(one.stage.module, one.content)
 
 
 class Campaign:
@@ -51,7 +51,7 @@ class Campaign:
         """Names of the jobs that are to run, in order."""
         found = []
         for name, one in self.jobs.items():
-            if rerun.fault(one) or self.before(name) & set(found):
+            if rerun.rerun_reason(one) or self.before(name) & set(found):
                 found.append(name)
         return found
 
@@ -94,7 +94,7 @@ class Campaign:
         elif name == rerun.COLLECT:
             collect.main(self.config, str(self.folder), dataset, str(one.record), one.digest)
         elif name == rerun.BROWSE:
-            browse.main(dataset, one.products[0], str(one.record), one.digest, *rerun.linked(self.study))
+            browse.main(dataset, one.products[0], str(one.record), one.digest, *rerun.linked_files(self.study))
         else:
             names = [one.name for one in rerun.output_jobs(self.study)[name]]
             present.main(dataset, str(self.folder), str(one.record), one.digest, *names)

@@ -16,5 +16,5 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder).values():
-            attempts.do(job.stage.module, job.content)
+            attempts.do_tasks(job.stage.module, job.content)
         collect.run(load_study(study), folder, output)

@@ -25,7 +25,7 @@ def stages(study, folder):
 
 def compute(module, content):
     """Do a job."""
-    attempts.do(module, content)
+    attempts.do_tasks(module, content)
 
 
 def keys(content):
@@ -62,7 +62,7 @@ def results(folder):
     """What is stored, by file and key: scalars, texts and the bytes of arrays, without times."""
     found = {}
     for path in sorted(folder.rglob("*.h5")):
-        for key, result in store.read(path, store.stored(path)).items():
+        for key, result in store.read(path, store.stored_keys(path)).items():
             found[path.parent.relative_to(folder).name, path.stem, key] = {
                 name: repr(without_times(value)) for name, value in result.items() if not name.endswith(TIMES)
             }

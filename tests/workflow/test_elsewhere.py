@@ -40,5 +40,5 @@ def test_no_character_of_a_path_is_the_shells(repository, tmp_path):
     done = subprocess.run(list(map(str, command)), cwd=config, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (results / "results/-mine/dataset.nc").is_file()
-    assert locks.claimed(results / "results/-mine") == config / "-mine.yaml"
+    assert locks.claimed_study(results / "results/-mine") == config / "-mine.yaml"
     assert not [*tmp_path.rglob("PWNED*")] and not (repository / "PWNED").exists()

@@ -80,7 +80,7 @@ from springtune.studies.kinds import load_study
 from springtune.studies.runs import rerun
 study = load_study("config/even.yaml")
 jobs = rerun.jobs(study, Path("results/even"))
-print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.fault(job)])
+print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.rerun_reason(job)])
 """
 
 SPRINGS, METADATA = "springtune_example/springs.py", "springtune_example-1.0.dist-info/METADATA"

@@ -92,7 +92,7 @@ RESULTS = Path("results") / STUDY.name
 JOBS = rerun.jobs(STUDY, RESULTS)
 gc.freeze()
 gc.enable()
-rerun.READ.append((STUDY, JOBS))
+rerun.STUDIES_READ.append((STUDY, JOBS))
 BUNDLES = [name for name, job in JOBS.items() if job.stage]
 """Names of all jobs before the dataset."""
 
@@ -154,13 +154,13 @@ def shown(one, path, selection):
 
 def begin():
     """Lock the studies and write the tasks of their jobs. A second call does nothing."""
-    if locks.HELD:
+    if locks.LOCKED_NOTES:
         return
     try:
-        for _, jobs in rerun.READ:
+        for _, jobs in rerun.STUDIES_READ:
             locks.check_idle(jobs["collect"].folder)
-        locks.begin([jobs["collect"].folder for _, jobs in rerun.READ])
-        for one, jobs in rerun.READ:
+        locks.lock([jobs["collect"].folder for _, jobs in rerun.STUDIES_READ])
+        for one, jobs in rerun.STUDIES_READ:
             folder = jobs["collect"].folder
             remove_unfinished(folder)
             to_present(folder)  # Snakemake refuses products that are older than what they are made of
@@ -171,18 +171,18 @@ def begin():
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:
-        locks.end()
+        locks.unlock()
         remedy = "make room or give leave to write there, then call the same command again"
         raise WorkflowError(f"{error.filename or RESULTS} cannot be written: {error.strerror}; {remedy}") from None
 
 
 def end(how):
     """Unlock the studies and log their summary, by a function of `springtune.studies.output.summary`."""
-    if not locks.HELD:
+    if not locks.LOCKED_NOTES:
         return
     from springtune.studies.output import summary  # here: only a run needs it
 
-    locks.end()
-    text = getattr(summary, how)(*rerun.READ[0], BEGUN)
-    text += "".join(summary.beside(*one, BEGUN) for one in rerun.READ[1:])
+    locks.unlock()
+    text = getattr(summary, how)(*rerun.STUDIES_READ[0], BEGUN)
+    text += "".join(summary.beside(*one, BEGUN) for one in rerun.STUDIES_READ[1:])
     logger.info(text, extra={"ends": True})

@@ -41,7 +41,7 @@ rule browse:
     params:
         digest=JOBS["browse"].digest,
         # What the page links to; other jobs make it meanwhile.
-        files=rerun.linked(STUDY),
+        files=rerun.linked_files(STUDY),
     log:
         RESULTS / "logs/browse.log",
     benchmark:

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 import click
 
 from .. import __version__
-from ..registry import imported
+from ..registry import import_name
 from ..safe_io.escapes import UNSEEN, shown
 
 
@@ -48,7 +48,7 @@ COMMANDS = {
 }
 """Modules and meanings of the commands, in the order of the help; each is imported when it is called."""
 
-ARGUMENT = re.compile("(mesh size|mesh types?|Young's modulus|Poisson's ratio|[a-z]+)(?=:| '| of ')")
+ARGUMENT_AT_BEGIN = re.compile("(mesh size|mesh types?|Young's modulus|Poisson's ratio|[a-z]+)(?=:| '| of ')")
 """Begin of messages with the name of an argument."""
 
 OPTIONS = {
@@ -64,15 +64,15 @@ OPTIONS = {
 """Options of arguments that have another name."""
 
 
-def in_options(message: str, command: click.Command | None) -> str:
+def name_option(message: str, command: click.Command | None) -> str:
     """Replace the name of an argument at the begin of a message by the option of a command.
 
     Examples
     --------
-    >>> in_options("force: '3 mm' is a length; give a force", main.get_command(None, "springs"))
+    >>> name_option("force: '3 mm' is a length; give a force", main.get_command(None, "springs"))
     "--force: '3 mm' is a length; give a force"
     """
-    if command and (found := ARGUMENT.match(message)):
+    if command and (found := ARGUMENT_AT_BEGIN.match(message)):
         option = "--" + OPTIONS.get(found[1], found[1])
         if any(option in one.opts for one in command.params):
             return option + message[found.end() :]
@@ -83,7 +83,7 @@ COMPLETION = "_SPRINGTUNE_COMPLETE"
 """Environment variable by which a shell asks click for completions."""
 
 
-class Shown(io.TextIOBase):
+class EscapedStream(io.TextIOBase):
     """Stream that escapes all control characters except line breaks and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -124,7 +124,7 @@ class Commands(click.Group):
         """Run a command."""
         if COMPLETION in os.environ:  # bytes, and for a shell
             return super().main(*arguments, **keywords)
-        with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):
+        with redirect_stdout(EscapedStream(sys.stdout)), redirect_stderr(EscapedStream(sys.stderr)):
             return super().main(*arguments, **keywords)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -139,7 +139,7 @@ class Commands(click.Group):
         except ValueError as error:
             lines = error.args if all(isinstance(one, str) for one in error.args) else (str(error),)
             command = self.get_command(ctx, ctx.invoked_subcommand or "")
-            said = "\n".join(shown(in_options(line, command)) for line in lines)
+            said = "\n".join(shown(name_option(line, command)) for line in lines)
             wrong = getattr(error, "wrong_call", said.startswith("--"))
             raise (WrongCall if wrong else click.ClickException)(said) from None
 
@@ -151,7 +151,7 @@ class Commands(click.Group):
         """Command of a name; None if there is none."""
         if cmd_name not in COMMANDS:
             return None
-        found: click.Command = imported(f"cli.{COMMANDS[cmd_name][0]}:{cmd_name}")
+        found: click.Command = import_name(f"cli.{COMMANDS[cmd_name][0]}:{cmd_name}")
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import examples
-from .options import STUDY_EXAMPLE, asked_beam, shape_of_study
+from .options import STUDY_EXAMPLE, read_beam, shape_of_study
 
 if TYPE_CHECKING:
     from ..scene.identify import Identified
@@ -78,7 +78,7 @@ def _test(
     if not ((beam or study) and load and file):
         raise ValueError("load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
     if beam:
-        return MeasuredTest(asked_beam(str(beam), thickness), load, file, **others)
+        return MeasuredTest(read_beam(str(beam), thickness), load, file, **others)
     about, _, body = shape_of_study(str(study))
     if about.plane_strain:
         raise ValueError(

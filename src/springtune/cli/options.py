@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def writing(option: str, target: Path) -> Iterator[None]:
+def file_errors(option: str, target: Path) -> Iterator[None]:
     """Context of writing the file of an option, whose errors name both."""
     try:
         yield
@@ -58,20 +58,20 @@ STUDY_EXAMPLE = "config/shapes.yaml:cook"
 
 # -- options that exclude each other -----------------------------------------------------------------------------------
 
-MEANINGLESS_BESIDE = {
+EXCLUDED_OPTIONS = {
     "study": ("beam", "thickness", "mesh", "unit", "young", "poisson", "plane", "force"),
     "material": ("young", "poisson"),
     "error": ("size", "engine"),
 }
 """Options that another one stands in for: it has, or finds, what they say."""
 
-MEANINGLESS_WITHOUT = {"scale": ("study", "engine"), "force": ("load", "engine")} | dict.fromkeys(
+REQUIRED_OPTIONS = {"scale": ("study", "engine"), "force": ("load", "engine")} | dict.fromkeys(
     ("dt", "substeps", "iterations", "precision", "definition"), ("engine",)
 )
 """Options that mean nothing without others, where a command has these."""
 
 
-def check_together() -> None:
+def check_option_pairs() -> None:
     """Refuse options of a call that leave each other no meaning."""
     context = click.get_current_context()
     known = {one.name or "": one.opts[0] for one in context.command.params}
@@ -82,10 +82,10 @@ def check_together() -> None:
     for name in given:
         said = f"{known[name]}: '{context.params[name]}'"
         for other in given:
-            if name in MEANINGLESS_BESIDE.get(other, ()):
+            if name in EXCLUDED_OPTIONS.get(other, ()):
                 beside = f"{known[other]} {context.params[other]}"
                 raise ValueError(f"{said} means nothing beside {beside}; leave one of the two out")
-        for other in MEANINGLESS_WITHOUT.get(name, ()):
+        for other in REQUIRED_OPTIONS.get(name, ()):
             if other in known and other not in given:
                 raise ValueError(f"{said} means nothing without {known[other]}; give {known[other]}, or leave it out")
 
@@ -93,7 +93,7 @@ def check_together() -> None:
 # -- beams and shapes --------------------------------------------------------------------------------------------------
 
 
-def asked_beam(text: str, thickness: str) -> "Beam":
+def read_beam(text: str, thickness: str) -> "Beam":
     """Beam of a text such as ``200x40``."""
     from ..problem.geometry import Beam
 
@@ -104,7 +104,7 @@ def asked_beam(text: str, thickness: str) -> "Beam":
     return Beam(length, height, thickness, text)
 
 
-def asked_material(given: Mapping[str, Any]) -> "Material":
+def read_material(given: Mapping[str, Any]) -> "Material":
     """Material of a name, or of its constants."""
     from ..problem.materials import Material
 
@@ -141,7 +141,7 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
 
 
 @dataclass(frozen=True)
-class Asked:
+class BodyOptions:
     """Body of the options, its material and load, and the mesh of a type and size [m]; a mesh file has no size.
 
     `body` is a Beam or a Shape, whose `material` is a mapping of parts; `make` makes a mesh of a type and a size.
@@ -172,9 +172,9 @@ class Asked:
         return self.make(self.mesh_type, self.size)
 
 
-def asked(given: Mapping[str, Any], load: str | None, sized: bool = True) -> Asked:
+def read_body(given: Mapping[str, Any], load: str | None, sized: bool = True) -> BodyOptions:
     """Body, material, load and mesh of options; `sized`: a mesh that is made needs a size."""
-    return (_asked_shape if given["study"] else _asked_beam)(given, load, sized)
+    return (_read_shape_options if given["study"] else _read_beam_options)(given, load, sized)
 
 
 def _size(given: Mapping[str, Any], needed: bool) -> float | None:
@@ -186,14 +186,14 @@ def _size(given: Mapping[str, Any], needed: bool) -> float | None:
     return None if given["size"] is None else positive(given["size"], "length", "size")
 
 
-def _asked_beam(given: Mapping[str, Any], load: str | None, sized: bool) -> Asked:
+def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     from ..mesh.formats import read_beam_mesh
     from ..mesh.types import MESH_TYPES
     from ..problem.quantities import positive
     from ..scene.meshes import make_mesh
 
-    material, mesh_type, size = asked_material(given), given["mesh"] or "structured", None
-    beam = asked_beam(given["beam"], given["thickness"])
+    material, mesh_type, size = read_material(given), given["mesh"] or "structured", None
+    beam = read_beam(given["beam"], given["thickness"])
     if sized and mesh_type in MESH_TYPES:
         size = _size(given, needed=True)
         assert size is not None  # for type checkers
@@ -208,10 +208,10 @@ def _asked_beam(given: Mapping[str, Any], load: str | None, sized: bool) -> Aske
         unit = given["unit"] if given["unit"][:1].isdigit() else f"1 {given['unit']}"
         return read_beam_mesh(mesh_type, beam.length, beam.height, positive(unit, "length", "unit"))
 
-    return Asked(beam, material, load, mesh_type, size, make)
+    return BodyOptions(beam, material, load, mesh_type, size, make)
 
 
-def _asked_shape(given: Mapping[str, Any], load: str | None, sized: bool) -> Asked:
+def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     """Shape of a study; load and material may be None if the study has only one for it."""
     from ..problem.quantities import nearest
 
@@ -245,7 +245,7 @@ def _asked_shape(given: Mapping[str, Any], load: str | None, sized: bool) -> Ask
             raise ValueError(f"size: {given['size'] or 'missing'}; '{shape.name}' has {which}")
         shape, size = replace(shape, file=chosen[0]), None
     make = partial(_shape_mesh, shape, shapes.refined[shape.name])
-    return Asked(shape, materials, load, shape.file or "free", size, make)
+    return BodyOptions(shape, materials, load, shape.file or "free", size, make)
 
 
 def _shape_mesh(shape: "Shape", refined: Mapping[str, float], _: str, size: float | None) -> "GroupedMesh":
@@ -293,7 +293,7 @@ def sheet_options(
     def decorate(command: AnyCommand) -> AnyCommand:
         @wraps(command)
         def call(**given: Any) -> None:
-            check_together()
+            check_option_pairs()
             command({name: given.pop(name) for name in each}, **given)
 
         return add_options(each)(call)

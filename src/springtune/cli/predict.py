@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import examples
-from .options import SPRING_FILES, Asked, Options, add_options, asked, check_target, sheet_options, writing
+from .options import (
+    SPRING_FILES,
+    BodyOptions,
+    Options,
+    add_options,
+    check_target,
+    file_errors,
+    read_body,
+    sheet_options,
+)
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -90,21 +99,21 @@ def predict(
         check_target("--write", target)
     names = None if load is None else [name.strip() for name in load.split(",") if name.strip()]
     if engine["engine"] is not None:
-        text, make = _in_engine(sheet, engine, names or [], springs_alone)
+        text, make = _answer_for_engine(sheet, engine, names or [], springs_alone)
     else:
-        body = asked(sheet, load, sized=error is None)
+        body = read_body(sheet, load, sized=error is None)
         if error is None:
-            text, make = _on_mesh(body, _under(body, names), springs_alone)
+            text, make = _answer_for_mesh(body, _load_arguments(body, names), springs_alone)
         else:
-            text, make = _on_meshes(body, _under(body, names), springs_alone, error, sheet["mesh"])
+            text, make = _answer_for_error(body, _load_arguments(body, names), springs_alone, error, sheet["mesh"])
     click.echo(text)
     if target is not None:
         net = make()
-        with writing("--write", target):
+        with file_errors("--write", target):
             click.echo(f"\n{written_text(net, net.write(target))}")
 
 
-def _under(body: Asked, names: list[str] | None) -> dict[str, Any]:
+def _load_arguments(body: BodyOptions, names: list[str] | None) -> dict[str, Any]:
     """Loads that count, as arguments of the library: loads of a beam, or the load case of a shape."""
     from ..prediction.choices import CASES, check_beam, check_loads
 
@@ -114,19 +123,19 @@ def _under(body: Asked, names: list[str] | None) -> dict[str, Any]:
     return {"loads": check_loads(CASES if names is None else names)}
 
 
-def _shape_problem(body: Asked) -> "ShapeProblem":
+def _shape_problem(body: BodyOptions) -> "ShapeProblem":
     from ..scene.boundary_problem import ShapeProblem
 
     return ShapeProblem(body.body, body.mesh, body.material, str(body.load), 1.0, "linear")
 
 
-def _subject(body: Asked, known: Any) -> "Subject":
+def _subject(body: BodyOptions, known: Any) -> "Subject":
     from .recommendation import beam_subject, shape_subject
 
     return beam_subject(body.body, body.material, known) if body.is_beam else shape_subject(_shape_problem(body), known)
 
 
-def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool) -> Answer:
+def _answer_for_mesh(body: BodyOptions, under: dict[str, Any], springs_alone: bool) -> Answer:
     """Best definition for one mesh."""
     from ..prediction.choices import SOLVED_PARTICLES, predict, references, shape_references
     from .recommendation import prediction_text, recommended
@@ -147,7 +156,9 @@ def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool) -> Answer:
     return prediction_text(_subject(body, known), body.mesh_name, counts, found), make
 
 
-def _on_meshes(body: Asked, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None) -> Answer:
+def _answer_for_error(
+    body: BodyOptions, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None
+) -> Answer:
     """Coarsest mesh that keeps an error."""
     from ..mesh.types import MESH_TYPES
     from ..prediction.search import find_mesh
@@ -166,14 +177,14 @@ def _on_meshes(body: Asked, under: dict[str, Any], springs_alone: bool, error: s
     return search_text(_subject(body, search.known), search, springs_alone), make
 
 
-def _recommended_net(body: Asked, definition: str | None, loads: Any, none: str) -> "SpringNet":
+def _recommended_net(body: BodyOptions, definition: str | None, loads: Any, none: str) -> "SpringNet":
     """Springs of the definition that is recommended."""
     if definition is None:
         raise click.ClickException(f"--write: {none}")
     return _net(body, definition, loads=loads)
 
 
-def _in_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
+def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
     """Calibration of an engine."""
     from ..engines.base import ENGINES, Setting
     from ..engines.calibration import fit_engine, runnable
@@ -186,7 +197,7 @@ def _in_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str],
     names = ("dt", "substeps", "iterations", "precision")
     setting = Setting(**{name: options[name] for name in names if options[name] is not None})
     engine.check(setting)
-    body = asked(sheet, loads[0] if loads else None)
+    body = read_body(sheet, loads[0] if loads else None)
     if body.load is None:
         raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
     make = partial(Scene, body.body, body.mesh, body.material, body.load, options["force"], scale=options["scale"])
@@ -198,10 +209,10 @@ def _in_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str],
         raise click.ClickException(refused)
     fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)
     text = fit_text(fit, body.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
-    return text, fit.net if fit.factor == fit.factor else partial(_unfitted, fit.message)
+    return text, fit.net if fit.factor == fit.factor else partial(_refuse_without_factor, fit.message)
 
 
-def _unfitted(why: str) -> "SpringNet":
+def _refuse_without_factor(why: str) -> "SpringNet":
     raise click.ClickException(f"--write: there is no factor, so nothing is written: {why}")
 
 
@@ -257,8 +268,8 @@ def springs(
     from .recommendation import written_text
 
     check_target("--out", target)
-    net = _net(asked(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
-    with writing("--out", target), warnings.catch_warnings(record=True) as heard:
+    net = _net(read_body(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
+    with file_errors("--out", target), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)
         written = net.write(target)
     click.echo(written_text(net, written))
@@ -267,7 +278,7 @@ def springs(
 
 
 def _net(
-    body: Asked,
+    body: BodyOptions,
     definition: str,
     *,
     loads: Any = None,

@@ -77,9 +77,9 @@ def archive(folder: Path, out: Path | None, force: bool) -> None:
     figures, tables, the versions of all packages, and the SHA-256 of every file.
     """
     from ..studies.kinds import load_study
-    from ..studies.runs.locks import claimed
+    from ..studies.runs.locks import claimed_study
 
-    config = claimed(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
+    config = claimed_study(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
     if not config.is_file():
         raise ValueError(f"{folder}: there is no {config}; give the results/<study> of a study that was run")
     if find_spec("rocrate") is None:

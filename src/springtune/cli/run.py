@@ -62,7 +62,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
             warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
             study = load_study(shown)
     except StudyError as error:
-        click.echo(str(error) + _meant(shown), err=True)
+        click.echo(str(error) + _suggestion(shown), err=True)
         raise SystemExit(1) from None
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
     if results and folder != Path.cwd():
@@ -77,11 +77,11 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
         why = f"{error.strerror}; name a folder that can be written"
         raise click.ClickException(f"--results {folder}: {why}") from None
     set_cache()
-    if _computes(options) or _plans(options):
+    if _computes(options) or _is_dry_run(options):
         study = study if path == shown else load_study(path)  # its files are seen from here
         others = [name for name in PAPER_STUDIES if name != study.name] if "paper" in options else []
         studies = [study, *(load_study(config_file(f"{name}.yaml", path.parent)) for name in others)]
-    if _plans(options):
+    if _is_dry_run(options):
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
         outdated = _outdated(studies, "a run makes it again")
         forced = ["--forcerun", *map(str, outdated)] if outdated else []
@@ -114,7 +114,7 @@ def set_cache() -> None:
         click.echo(f"note: {usual} cannot be written; .snakemake/cache stands in for it", err=True)
 
 
-LOOKING = {
+READ_ONLY_OPTIONS = {
     "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--dry-run", "--dryrun", "--filegraph",
     "--lc", "--li", "--lint", "--list", "--list-changes", "--list-code-changes", "--list-input-changes",
     "--list-params-changes", "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp",
@@ -125,22 +125,22 @@ LOOKING = {
 
 def _computes(options: list[str]) -> bool:
     """Return whether Snakemake computes anything with these options."""
-    return not any(one.partition("=")[0] in LOOKING for one in options)
+    return not any(one.partition("=")[0] in READ_ONLY_OPTIONS for one in options)
 
 
-HOW = {"--cores": 1, "-c": 1, "--jobs": 1, "-j": 1, "--quiet": 0, "-q": 0, "--keep-going": 0, "-k": 0}
+OPTION_VALUE_COUNTS = {"--cores": 1, "-c": 1, "--jobs": 1, "-j": 1, "--quiet": 0, "-q": 0, "--keep-going": 0, "-k": 0}
 """Options that do not change what a run makes, with their numbers of values."""
 
 
 def _asks_for_all(options: list[str]) -> bool:
     """Return whether the options request the whole study and force nothing."""
     rest = options
-    while rest and rest[0].partition("=")[0] in HOW:
-        rest = rest[1 + (HOW[rest[0]] if "=" not in rest[0] else 0) :]
+    while rest and rest[0].partition("=")[0] in OPTION_VALUE_COUNTS:
+        rest = rest[1 + (OPTION_VALUE_COUNTS[rest[0]] if "=" not in rest[0] else 0) :]
     return not rest
 
 
-def _plans(options: list[str]) -> bool:
+def _is_dry_run(options: list[str]) -> bool:
     """Return whether the run is a dry run."""
     return not {"-n", "-np", "--dry-run", "--dryrun"}.isdisjoint(options)
 
@@ -190,7 +190,7 @@ def _wants_slurm(options: list[str]) -> bool:
     return any(Path(one).name == "slurm" for one in named)
 
 
-def _meant(path: Path) -> str:
+def _suggestion(path: Path) -> str:
     """Suggestion of an existing study for a missing one, or an empty string."""
     near = config_file(f"{path.stem}.yaml")
     return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""

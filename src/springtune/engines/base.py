@@ -21,7 +21,7 @@ from ..handover.terms import Net
 from ..mechanics.energies import Energy
 from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
-from ..registry import Declared, Registry, how_to_install
+from ..registry import Declaration, Registry, how_to_install
 from ..safe_io.tables import number_text
 
 MOST_COUNTED, LONG_FRAME = 100_000, 1.0
@@ -160,7 +160,7 @@ def typed_springs(net: SpringNet) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Engine(Declared):
+class Engine(Declaration):
     """An engine with one of its solvers; made by the decorator `engine`.
 
     Attributes

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import TypeVar
 
-from ..registry import Declared, Registry
+from ..registry import Declaration, Registry
 from .cells import SIDES, Mesh, MeshError
 
 MOST_MESHED = 5_000_000
@@ -62,7 +62,7 @@ Function = TypeVar("Function", bound=Callable[..., Mesh])
 
 
 @dataclass(frozen=True, eq=False)
-class MeshType(Declared):
+class MeshType(Declaration):
     """A mesh type of studies, made by the decorator `mesh_type`; call it to make a mesh.
 
     `function` takes (length, height, size) [m]. `row_height` is over the mesh size [1].

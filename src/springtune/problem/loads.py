@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from ..registry import NAME, NAME_RULE, Extended
+from ..registry import NAME, NAME_RULE, ExtensibleMapping
 from .geometry import Beam
 from .shapes import LoadCase, Quantity, Support, Traction
 
@@ -207,7 +207,7 @@ def _adopted(name: str, load: Any) -> Load:
     return replace(load, kind=replace(load.kind, name=f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:8]}"))
 
 
-LOADS = Extended("load", "loads", OWN_LOADS, _adopted)
+LOADS = ExtensibleMapping("load", "loads", OWN_LOADS, _adopted)
 """Loads by name."""
 
 KINEMATICS = ("nonlinear", "linear")

@@ -10,7 +10,7 @@ import numpy as np
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import LEAST, MOST
-from ..registry import Declared, Registry
+from ..registry import Declaration, Registry
 
 
 class DefinitionError(ValueError):
@@ -86,7 +86,7 @@ class Springs:
 
 
 @dataclass(frozen=True, eq=False)
-class Definition(Declared):
+class Definition(Declaration):
     """A definition of a study; made by the decorator `definition`.
 
     Attributes

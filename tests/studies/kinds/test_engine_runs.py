@@ -198,7 +198,7 @@ def test_the_best_factor_gives_the_references_displacement(collected):
 
 
 def forget():
-    for one in (keys.stage_key, keys.code_key, keys.installed, keys.distribution):
+    for one in (keys.stage_key, keys.code_key, keys.version_of, keys.distribution):
         one.cache_clear()
 
 

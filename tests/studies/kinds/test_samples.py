@@ -257,10 +257,10 @@ class TestRuns:
         before, after = (tree["samples"].to_dataset().isel(sample=slice(count)) for tree in (small, large))
         xr.testing.assert_identical(before.drop_attrs(), after.drop_attrs())
         assert campaign.due()[-2:] == ["present_scenes", "browse"]
-        before = {path: store.stored(path) for path in new}
+        before = {path: store.stored_keys(path) for path in new}
         further = ("definition: lattice\n  parameters", "definition: [lattice, van-gelder]\n  parameters")
         tree, _ = run(("size: 16", "size: 32"), further, name="sample")
-        assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
+        assert [len(store.stored_keys(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
     def test_a_sample_needs_neither_grids_nor_beams_nor_materials(self, here):

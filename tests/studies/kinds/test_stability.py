@@ -19,7 +19,7 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
              "definition": "axis-exact", "mesh_type": "free", "mesh_sizes": [5e-3]}  # fmt: skip
     tasks = [{"key": "one", "name": "contrast"} | setup]
     content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
-    attempts.do("studies.kinds.stability.solve", content)
+    attempts.do_tasks("studies.kinds.stability.solve", content)
     assert store.read(tmp_path / "one.h5", ["one"])["one"]["experiment_message"]
 
 

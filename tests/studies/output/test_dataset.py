@@ -11,7 +11,7 @@ import xarray as xr
 
 import springtune as st
 from cf import complaints
-from springtune.registry import imported
+from springtune.registry import import_name
 from springtune.safe_io import atomic
 from springtune.studies.config.kind import modules
 from springtune.studies.kinds import load_study
@@ -39,7 +39,7 @@ VERSION = {"springtune_version": "0"}
 GROUPS = {
     f"{name.split('.')[2]}{group.name}": group
     for name in modules("variables", "collect")
-    for group in vars(imported(name)).values()
+    for group in vars(import_name(name)).values()
     if isinstance(group, Group)
 }
 

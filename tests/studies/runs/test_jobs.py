@@ -41,7 +41,7 @@ def path(tmp_path):
 
 
 def test_results_come_back_as_they_went(path):
-    assert store.stored(path) == RESULTS.keys()
+    assert store.stored_keys(path) == RESULTS.keys()
     assert same(store.read(path, RESULTS, ["field", "empty"]), RESULTS)
     assert "field" not in store.read(path, ["one"])["one"]
     with pytest.raises(DamagedError, match="lacks 1 of 1 results; delete it"):
@@ -70,7 +70,7 @@ def test_a_file_that_is_none_is_one_sentence(path, content):
     if content is not None:
         path.write_bytes(whole[:-100] if content == "cut" else content)
         with pytest.raises(DamagedError, match="is damaged"):
-            store.stored(path)
+            store.stored_keys(path)
     with pytest.raises(DamagedError, match="damaged|missing"):
         store.read(path, RESULTS)
 
@@ -103,9 +103,7 @@ def stage(tmp_path, monkeypatch):
         return json.loads((tmp_path / "done/tested_0.json").read_text())["computed"]
 
     def read():
-        return {
-            key: one for name in ("a", "b") for key, one in store.everything(tmp_path / f"tested/{name}.h5").items()
-        }
+        return {key: one for name in ("a", "b") for key, one in store.read_all(tmp_path / f"tested/{name}.h5").items()}
 
     return acts, run, read, tmp_path
 
@@ -167,7 +165,7 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     for outside in (
         "studies/output/style.py",
         "studies/output/dataset.py",
-        "studies/config/load.py",
+        "studies/config/expand.py",
         "reference/small_strain.py",
     ):
         assert outside not in solve

@@ -64,7 +64,7 @@ def test_meshers_count_with_their_meshes():
 
 def forget():
     """Forget keys; of the same code, versions may be others."""
-    for one in (keys.stage_key, keys.code_key, keys.installed, keys.distribution):
+    for one in (keys.stage_key, keys.code_key, keys.version_of, keys.distribution):
         one.cache_clear()
 
 

@@ -28,12 +28,12 @@ def test_without_a_note_nobody_computes():
 
 
 def test_a_run_locks_its_study_until_its_end_and_is_named_with_the_remedy():
-    locks.begin([STUDY])
+    locks.lock([STUDY])
     told = rf"results/mine: process {os.getpid()} on .* computes it since .* \(.*\); wait for its end, or .* kill \d+"
     with pytest.raises(locks.LockedError, match=told):
         locks.check_idle(STUDY)
     assert not locks.check_idle(Path("results/mine_too"))
-    locks.end()
+    locks.unlock()
     assert not locks.check_idle(STUDY)
 
 

@@ -12,7 +12,7 @@ from springtune.problem.quantities import nearest
 from springtune.safe_io.inputs import Rows, csv_rows
 
 from .fields import BeamName, Load, MaterialName, MeshType, Section
-from .messages import Key, Problems, show, unseen, validated
+from .messages import Key, Problems, control_character_fault, show, validated
 from .sections import GRID_PARAMETERS, GridConfig
 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
@@ -59,7 +59,7 @@ def _table(path: Path, where: Sequence[Key], problems: Problems, example: str) -
         problems.stop_at(where, str(error))
     own = Problems(str(path))
     for line, row in rows:
-        for why in filter(None, map(unseen, row)):
+        for why in filter(None, map(control_character_fault, row)):
             own.add((), why, line)
         if len(row) != len(rows[0][1]):
             own.add((), f"{len(row)} values in {len(rows[0][1])} columns; give one for each", line)

@@ -123,7 +123,7 @@ def swept(config: StudyConfig, references: Iterable[Reference]) -> tuple[str, ..
     return tuple(name for name in SWEPT if name in found or (name == "force" and len({*loaded}) < len(loaded)))
 
 
-def _bodies(
+def _body_makers(
     known: Declared, files: MeshFiles
 ) -> tuple[Callable[..., Beam], Callable[..., Material], Callable[..., MeshSpec | None]]:
     """Functions that make each beam, material and mesh of a study once; a mesh is None if its file is missing."""
@@ -158,7 +158,7 @@ def _force(pressure: float, beam: Beam) -> float:
 
 def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Expand grids into scenes and curves."""
-    make_beam, make_material, make_mesh = _bodies(bodies, mesh_files)
+    make_beam, make_material, make_mesh = _body_makers(bodies, mesh_files)
     grids = []
     for name, grid in config.grids.items():
         scenes: list[SceneSpec] = []

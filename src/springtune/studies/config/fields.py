@@ -36,7 +36,7 @@ MOST_POINTS = 10_001
 
 MOST_LISTED = 10_000
 
-BEYOND_MEASURE = 1e30
+LARGEST_QUANTITY = 1e30
 """Size of a quantity of either sign from which nothing can be computed with it [SI units]."""
 
 FEW_NAMES = 5
@@ -81,7 +81,7 @@ def read_quantity(value: object, kind: str, signed: bool = False) -> float:
         raise refuse(str(error)) from None
     if not number > 0 and not signed:
         raise refuse(f"{show(value)} is not above zero; give a size above zero, such as '{about.example}'")
-    if not abs(number) < BEYOND_MEASURE if signed else beyond(number, kind):
+    if not abs(number) < LARGEST_QUANTITY if signed else beyond(number, kind):
         raise refuse(f"{show(value)} is beyond all measure; give {about.words}")
     return number + 0.0
 
@@ -125,7 +125,7 @@ FILES = "files that a study names"
 """Key of their list in the context of validation."""
 
 
-def _noted(name: str, info: ValidationInfo) -> str:
+def _note_file(name: str, info: ValidationInfo) -> str:
     if info.context is not None:
         info.context[FILES].append(name)
     return name
@@ -156,7 +156,7 @@ FurtherReference = Annotated[str, *one_of("reference", FURTHER_REFERENCES)]
 Kinematics = Annotated[str, *one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, *one_of("definition", DEFINITIONS)]
 Text = Annotated[str, Field(min_length=1, title="a text")]
-FileName = Annotated[str, Field(min_length=1, title="the path of a file"), AfterValidator(_noted)]
+FileName = Annotated[str, Field(min_length=1, title="the path of a file"), AfterValidator(_note_file)]
 BeamName = Annotated[str, Field(title="the name of a beam"), declared("beam", "beams")]
 MaterialName = Annotated[str, Field(title="the name of a material"), declared("material", "materials")]
 
@@ -172,7 +172,7 @@ def or_item(schema: dict[str, Any]) -> None:
         schema["anyOf"] = [array["items"], array]
 
 
-def _listed(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
+def _read_list(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
     """List of one value or several; only a tuple, the column of a file of rows, may have a value twice."""
     items = handler([value] if isinstance(value, str) else value)
     if isinstance(value, list) and len(set(items)) < len(items):
@@ -182,7 +182,7 @@ def _listed(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
 
 
 OneOrMore = Annotated[
-    list[Item], Field(min_length=1, max_length=MOST_LISTED, json_schema_extra=or_item), WrapValidator(_listed)
+    list[Item], Field(min_length=1, max_length=MOST_LISTED, json_schema_extra=or_item), WrapValidator(_read_list)
 ]
 """A list without duplicates; a single value is a list of one."""
 
@@ -218,7 +218,7 @@ def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
     return [first, *(float(f"{value:.{RANGE_DIGITS}g}") for value in inside), last]
 
 
-def _ranged(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
+def _read_range(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
     """Numbers of a list, or of a range such as ``{from: 1 mm, to: 5 mm, points: 9}``."""
     if not isinstance(value, dict) or RANGE_KEYS.isdisjoint(value):
         return handler(value)
@@ -246,7 +246,7 @@ Angles = Annotated[
         lambda value: [value] if isinstance(value, str) else value, json_schema_input_type=Angle | list[Angle]
     ),
 ]
-Numbers = Annotated[OneOrMore[Item], Field(json_schema_extra=_or_range), WrapValidator(_ranged), OrSection(Range)]
+Numbers = Annotated[OneOrMore[Item], Field(json_schema_extra=_or_range), WrapValidator(_read_range), OrSection(Range)]
 """Numbers: one, a list, or a range."""
 
 DefinitionNames = OneOrMore[DefinitionName]
@@ -266,7 +266,7 @@ BeamForces = Annotated[
 # -- sections by name --------------------------------------------------------------------------------------------------
 
 
-def _names(sections: dict[str, Item]) -> dict[str, Item]:
+def _check_names(sections: dict[str, Item]) -> dict[str, Item]:
     """Refuse names that cannot be those of different files."""
     seen: dict[str, str] = {}
     for name in sections:
@@ -281,7 +281,7 @@ def _names(sections: dict[str, Item]) -> dict[str, Item]:
 Named = Annotated[
     dict[str, Item],
     Field(min_length=1, json_schema_extra={"propertyNames": {"pattern": f"^{NAME.pattern}$"}}),
-    AfterValidator(_names),
+    AfterValidator(_check_names),
 ]
 """Sections whose names may become file names."""
 

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springtune.registry import imported
+from springtune.registry import import_name
 
 if TYPE_CHECKING:
     from .messages import Problems
@@ -129,12 +129,12 @@ def modules(*names: str) -> list[str]:
 @cache
 def kinds() -> tuple[StudyKind, ...]:
     """All study kinds."""
-    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
+    return tuple(import_name(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
 
 
 @cache
 def outputs() -> dict[str, Output]:
     """Outputs of all study kinds, by name."""
-    apart = {name.split(".")[2]: imported(f"{name}:OUTPUTS") for name in modules("outputs")}
-    found = [apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS]
+    apart = {name.split(".")[2]: import_name(f"{name}:OUTPUTS") for name in modules("outputs")}
+    found = [apart[name] if name in apart else import_name(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS]
     return {output.name: output for outputs in found for output in outputs}

@@ -241,7 +241,7 @@ def show(value: object) -> str:
     return f"'{clipped(str(value))}'"
 
 
-def unseen(text: str) -> str:
+def control_character_fault(text: str) -> str:
     """Return why a text is not one line of visible characters, or an empty string."""
     found = UNSEEN.search(text)
     return f"{show(text)} has '{shown(found[0])}'; write one line of characters that can be seen" if found else ""
@@ -355,6 +355,6 @@ class _Reader:
     def text(self, node: yaml.ScalarNode, path: tuple[Key, ...]) -> str:
         """Text of a scalar in one line; the line break that ends a block is not the text's."""
         text: str = node.value.rstrip("\n") if node.style in ("|", ">") else node.value
-        if why := unseen(text):
+        if why := control_character_fault(text):
             self.refuse(node, why, path)
         return text

@@ -231,7 +231,7 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
     return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
-once_a_study = lru_cache(maxsize=8)
+cache_by_study = lru_cache(maxsize=8)
 """Decorator of a function of a study whose last answers are kept."""
 
 

@@ -124,7 +124,7 @@ class MaterialConfig(Section):
     """Density, needed for dynamics and gravity."""
 
     @model_validator(mode="after")
-    def _whole(self) -> Self:
+    def _check_form(self) -> Self:
         given = [[key for key in form if getattr(self, key) is not None] for form in MATERIAL_FORMS]
         keys = [keys for keys in given if keys]
         if len(keys) > 1:
@@ -231,7 +231,7 @@ class SensitivityConfig(Section):
     """Number of stiffnesses, with both ends."""
 
     @model_validator(mode="after")
-    def _ascending(self) -> Self:
+    def _check_order(self) -> Self:
         if not self.start < self.stop:
             raise refuse(f"{self.start:g} is not below 'to', {self.stop:g}; give a smaller 'from'", "from")
         return self
@@ -304,7 +304,7 @@ class GridConfig(Section):
     """Factors on all stiffnesses and energies of a definition."""
 
     @model_validator(mode="after")
-    def _one_force(self) -> Self:
+    def _check_force(self) -> Self:
         if (self.force is None) == (self.pressure is None):
             both = "both 'force' and 'pressure'; remove one"
             pressed = all(LOADS[load].kind.pressed for load in self.load)
@@ -334,7 +334,7 @@ GRID_PARAMETERS = tuple(name for name in GridConfig.model_fields if name not in 
 """Keys of a grid whose values are combined."""
 
 
-def _own_names(files: dict[str, Any]) -> dict[str, Any]:
+def _check_mesh_type_names(files: dict[str, Any]) -> dict[str, Any]:
     for name in files:
         if name in MESH_TYPES:
             raise refuse(f"'{name}' is a mesh type that is made; rename yours", name)
@@ -359,7 +359,7 @@ class StudyConfig(Section):
     sensitivity: SensitivityConfig = Field(default_factory=SensitivityConfig)
     """Range of stiffness of the sensitivity curves."""
 
-    mesh_files: Annotated[Named[list[MeshFileConfig]], AfterValidator(_own_names)] | None = Field(
+    mesh_files: Annotated[Named[list[MeshFileConfig]], AfterValidator(_check_mesh_type_names)] | None = Field(
         None, title="a list of files for each mesh type, by name"
     )
     """Your own mesh types: one file per beam and mesh size."""
@@ -380,7 +380,7 @@ class StudyConfig(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _something(cls, value: Any) -> Any:
+    def _check_sections(cls, value: Any) -> Any:
         """Refuse a study of no grids nor a section that may stand alone, and one that lacks what these need."""
         if not isinstance(value, dict):
             return value

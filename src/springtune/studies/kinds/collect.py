@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from springtune.registry import imported
+from springtune.registry import import_name
 from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
@@ -63,11 +63,13 @@ def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:
-            own = partial(_of_tasks, kind) if kind.variables else imported(f"studies.kinds.{kind.name}.collect:groups")
+            own = (
+                partial(_of_tasks, kind) if kind.variables else import_name(f"studies.kinds.{kind.name}.collect:groups")
+            )
             groups |= own(study, folder)
     for made in outputs().values():
         if made.collect and made.name in study.outputs:
-            groups |= imported(made.collect).groups(study, folder)
+            groups |= import_name(made.collect).groups(study, folder)
     return groups
 
 

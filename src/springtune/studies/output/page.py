@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from springtune.registry import imported
+from springtune.registry import import_name
 from springtune.safe_io.atomic import write_text
 
 from ..config.kind import modules
@@ -24,7 +24,7 @@ COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "
 
 def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     """Write a CSV file for each table, and a page with all."""
-    found = (getattr(imported(name), "tables", None) for name in modules("outputs", "tables"))
+    found = (getattr(import_name(name), "tables", None) for name in modules("outputs", "tables"))
     tables = [table for of_kind in found if of_kind for table in of_kind(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     written["index.html"] = html(tables, tree)

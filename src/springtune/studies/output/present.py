@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from springtune.registry import imported
+from springtune.registry import import_name
 from springtune.safe_io import atomic
 
 from ..config.kind import outputs
@@ -33,7 +33,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
 
                 made += [into / name for name in page.write(tree, into)]
             if output.write:
-                made += [into / name for name in imported(output.write)(tree, into)]
+                made += [into / name for name in import_name(output.write)(tree, into)]
     return made
 
 
@@ -51,7 +51,7 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     from . import style
 
     single = [(output.name, style.styled(_single), {"output": output})]
-    drawn: Any = single if output.draw else imported(output.plot)(tree)
+    drawn: Any = single if output.draw else import_name(output.plot)(tree)
     for stem, plot, selection in drawn:
         figure = np.ravel(plot(tree, **selection))[0].figure
         for ending, content in style.png_and_pdf(figure).items():

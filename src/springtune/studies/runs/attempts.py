@@ -30,7 +30,7 @@ from types import ModuleType
 from typing import Any
 
 from springtune.problem.status import Status
-from springtune.registry import imported
+from springtune.registry import import_name
 
 from . import store
 from .store import DamagedError
@@ -51,14 +51,14 @@ class RefusedError(Exception):
     """Tasks cannot be prepared, mostly because their mesh failed."""
 
 
-def in_worker(name: str, content: dict[str, Any]) -> int:
+def do_in_worker(name: str, content: dict[str, Any]) -> int:
     """Do the tasks of a job in a worker process, started anew after each task that ends it; return their number."""
     lost: dict[str, str] = {}
     with tempfile.TemporaryFile() as under_way:
         while True:
             with ProcessPoolExecutor(1, multiprocessing.get_context("fork"), end_with_parent) as worker:
                 try:
-                    return worker.submit(do, name, content, lost, under_way.fileno()).result()
+                    return worker.submit(do_tasks, name, content, lost, under_way.fileno()).result()
                 except BrokenProcessPool:
                     key = os.pread(under_way.fileno(), LONGEST_KEY, 0).rstrip(b"\0").decode()
             if not key or key in lost:
@@ -72,9 +72,11 @@ def end_with_parent() -> None:
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
-def do(name: str, content: dict[str, Any], lost: Mapping[str, str] | None = None, under_way: int | None = None) -> int:
+def do_tasks(
+    name: str, content: dict[str, Any], lost: Mapping[str, str] | None = None, under_way: int | None = None
+) -> int:
     """Do the tasks of a job whose results are missing, except `lost` ones with their reasons; return their number."""
-    module, attempts = imported(name), Attempts(lost or {}, under_way)
+    module, attempts = import_name(name), Attempts(lost or {}, under_way)
     getattr(module, "run", partial(solve_files, module))(content, attempts)
     for error in attempts.broken[:TRACEBACKS]:
         traceback.print_exception(error)
@@ -103,7 +105,7 @@ class Attempts:
         except DamagedError:
             raise
         except Exception as error:
-            why = own_reason(error)
+            why = failure_reason(error)
             if not why:
                 self.broken.append(error)
                 return None
@@ -117,14 +119,14 @@ class Attempts:
             os.pwrite(self.under_way, key.encode().ljust(LONGEST_KEY, b"\0"), 0)
 
 
-def own_reason(error: Exception) -> str:
+def failure_reason(error: Exception) -> str:
     """Return the reason of a failed task, or an empty string if the program is broken.
 
     Examples
     --------
-    >>> own_reason(ZeroDivisionError("division by zero"))
+    >>> failure_reason(ZeroDivisionError("division by zero"))
     'ZeroDivisionError: division by zero'
-    >>> own_reason(TypeError("unsupported operand"))
+    >>> failure_reason(TypeError("unsupported operand"))
     ''
     """
     # By name: results shall not depend on the code of meshes and definitions for the sake of an exception.
@@ -147,7 +149,7 @@ def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any
     path = Path(content["folder"]) / f"{file['name']}.h5"
     failed: Callable[[Task, str], Result] = getattr(module, "failed", _failed)
     parts: Callable[[Task, Result], dict[str, Result]] = getattr(module, "parts", _one_part)
-    present = store.stored(path)
+    present = store.stored_keys(path)
     tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
     missing = [task for task in tasks if not parts(task, {}).keys() <= present]
     if not missing:
@@ -157,7 +159,7 @@ def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any
         shared = [attempts.attempt(file["name"], partial(module.prepare, file, content), RefusedError)]
         if shared == [None]:
             return
-    with store.Keeper(path) as keeper:
+    with store.ResultBuffer(path) as keeper:
         for task in sorted(missing, key=module.order) if hasattr(module, "order") else missing:
             if shared and isinstance(shared[0], RefusedError):
                 result = failed(task, f"mesh: {shared[0]}")

@@ -13,7 +13,7 @@ from typing import Any
 from springtune.problem.geometry import AssumptionWarning
 from springtune.safe_io import atomic
 
-from .attempts import in_worker
+from .attempts import do_in_worker
 from .source import PACKAGE, RECORDS, STATE, TASKS, hash_of, read_note, source_state
 from .store import DamagedError
 
@@ -30,7 +30,7 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
     if os.environ.get(STATE, source_state()) != source_state():
         raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
     try:
-        computed = in_worker(note["module"], note["content"])
+        computed = do_in_worker(note["module"], note["content"])
     except DamagedError as error:
         forget_job_of(error.path, Path(tasks).parents[1])
         raise SystemExit(str(error)) from None

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from springtune.mesh.types import MESH_TYPES
-from springtune.registry import Declared, plugin_packages
+from springtune.registry import Declaration, plugin_packages
 from springtune.springs.base import DEFINITIONS
 
 from .source import PACKAGE, hash_of
@@ -35,7 +35,7 @@ DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fe
 """Distributions with another name than their package; a search takes a third of a second."""
 
 
-def for_readers(one: Any) -> bool:
+def is_for_readers(one: Any) -> bool:
     """Return whether a statement is a docstring, ``pass`` or for type checkers."""
     if isinstance(one, ast.Expr):
         return isinstance(one.value, ast.Constant) and isinstance(one.value.value, str)
@@ -49,7 +49,7 @@ def _add_parts(node: Any, parts: list[str]) -> None:
     if isinstance(node, list):
         parts.append("[")
         for one in node:
-            if not for_readers(one):
+            if not is_for_readers(one):
                 _add_parts(one, parts)
         parts.append("]")
     elif isinstance(node, ast.AST):
@@ -91,7 +91,7 @@ class Closure(NamedTuple):
         """Hash of the code, wherever it is."""
         return hash_of(sorted(map(file_digest, self.files)))
 
-    def with_(self, other: "Closure") -> "Closure":
+    def union(self, other: "Closure") -> "Closure":
         """Union of two closures."""
         return Closure(self.files | other.files, self.packages | other.packages)
 
@@ -141,23 +141,23 @@ def mesh_type_closure(name: str) -> Closure:
     """Closure of a mesh type; for a name of mesh files, that of their reader, with meshio."""
     if name in MESH_TYPES:
         return declared_closure(MESH_TYPES[name])
-    return closure("mesh.formats").with_(Closure(packages=frozenset({"meshio"})))
+    return closure("mesh.formats").union(Closure(packages=frozenset({"meshio"})))
 
 
 # -- code outside of this package --------------------------------------------------------------------------------------
 
 
 @cache
-def declared_closure(one: Declared) -> Closure:
+def declared_closure(one: Declaration) -> Closure:
     """Closure of the module of a declared function."""
     if one.file is None:
         raise ValueError(f"'{one.name}' was typed, and jobs of a study do not find it; put it into a module of yours")
     if one.file.is_relative_to(PACKAGE):
         return closure(".".join(one.file.relative_to(PACKAGE).with_suffix("").parts))
-    return elsewhere(one.file)
+    return closure_outside(one.file)
 
 
-def elsewhere(path: Path) -> Closure:
+def closure_outside(path: Path) -> Closure:
     """Closure of code outside of this package, with the files of modules that no distribution has."""
     files, waiting = {path}, [path]
     ours, packages = set[str](), plugin_packages() & {*path.with_suffix("").parts}  # a package's version counts, too
@@ -172,7 +172,7 @@ def elsewhere(path: Path) -> Closure:
             found = _files_below(root, [top, *parts]) - files if root else set()
             waiting += found
             files |= found
-    return closure(*ours).with_(Closure(frozenset(files), frozenset(packages)))
+    return closure(*ours).union(Closure(frozenset(files), frozenset(packages)))
 
 
 def _imports(tree: ast.AST) -> Iterator[tuple[int, str]]:
@@ -204,7 +204,7 @@ def _root(folder: Path, package: str) -> Path | None:
         return None
     if (folder / package).is_dir() or (folder / f"{package}.py").is_file():
         return folder
-    if package in plugin_packages() or installed(distribution(package)) == "none":
+    if package in plugin_packages() or version_of(distribution(package)) == "none":
         spec = find_spec(package)
         origin = Path(spec.origin) if spec and spec.origin else Path()
         if origin.suffix == ".py":
@@ -242,7 +242,7 @@ def distribution(package: str) -> str:
 
 
 @cache
-def installed(distribution: str) -> str:
+def version_of(distribution: str) -> str:
     """Version of a distribution; "none" if it is not installed or not wanted."""
     from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
 
@@ -264,7 +264,7 @@ def definition_key(name: str) -> str:
     return code_key(definition_closure(name))
 
 
-def declared_key(one: Declared) -> str:
+def declared_key(one: Declaration) -> str:
     """Key of the code of a declared function, such as an engine."""
     return code_key(declared_closure(one))
 
@@ -277,7 +277,7 @@ def mesh_type_key(name: str) -> str:
 @cache
 def code_key(code: Closure) -> str:
     """Key of code and the versions of its packages."""
-    versions = (f"{name} {installed(name)}" for name in map(distribution, code.packages))
+    versions = (f"{name} {version_of(name)}" for name in map(distribution, code.packages))
     return hash_of(code.digest, [f"python {sys.version_info[0]}.{sys.version_info[1]}", *sorted(set(versions))])
 
 

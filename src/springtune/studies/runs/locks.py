@@ -23,7 +23,7 @@ from .source import TASKS
 STUDY_FILE, RUN_FILE = f"{TASKS}/study.json", f"{TASKS}/run.json"
 """Files in a study's folder: the path of the config that was run last, and the process that runs it."""
 
-HELD: list[TextIO] = []
+LOCKED_NOTES: list[TextIO] = []
 """Notes that this process has locked."""
 
 
@@ -38,7 +38,7 @@ def claim(folder: Path, config: Path) -> None:
     write_json(folder / STUDY_FILE, note)
 
 
-def claimed(folder: Path) -> Path | None:
+def claimed_study(folder: Path) -> Path | None:
     """File of the study that a folder belongs to, or None."""
     try:
         path = folder.parent.parent / json.loads((folder / STUDY_FILE).read_bytes())["config"]
@@ -49,30 +49,30 @@ def claimed(folder: Path) -> Path | None:
 
 def check_claim(folder: Path, config: Path) -> None:
     """Refuse a folder of another study of the same name; a file with the same content is the same study."""
-    other = claimed(folder)
+    other = claimed_study(folder)
     if other is None or not config.is_file() or filecmp.cmp(other, config, shallow=False):
         return
     remedy = f"rename one of the two, or call: springtune run {shlex.quote(str(config))} --results FOLDER"
     raise LockedError(f"{folder}: holds the results of {other}, another study of the same name; {remedy}")
 
 
-def begin(folders: Iterable[Path]) -> None:
+def lock(folders: Iterable[Path]) -> None:
     """Note that this process computes studies, and lock the notes until its end."""
     since, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)
     said = f"process {os.getpid()} on {platform.node()} computes it since {since} ({command})"
     for folder in folders:
         (folder / RUN_FILE).parent.mkdir(parents=True, exist_ok=True)
-        HELD.append((folder / RUN_FILE).open("a+", encoding="utf-8"))
-        _lock(HELD[-1], folder)
-        HELD[-1].truncate(0)
-        HELD[-1].write(f"{said}; wait for its end, or stop it: kill {os.getpid()}")
-        HELD[-1].flush()
+        LOCKED_NOTES.append((folder / RUN_FILE).open("a+", encoding="utf-8"))
+        _lock(LOCKED_NOTES[-1], folder)
+        LOCKED_NOTES[-1].truncate(0)
+        LOCKED_NOTES[-1].write(f"{said}; wait for its end, or stop it: kill {os.getpid()}")
+        LOCKED_NOTES[-1].flush()
 
 
-def end() -> None:
+def unlock() -> None:
     """Unlock the notes of this process."""
-    while HELD:
-        with HELD.pop() as file:
+    while LOCKED_NOTES:
+        with LOCKED_NOTES.pop() as file:
             file.truncate(0)
 
 

@@ -11,12 +11,12 @@ from typing import Any
 from springtune import __version__
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
-from springtune.registry import Extended
+from springtune.registry import ExtensibleMapping
 from springtune.springs.base import DEFINITIONS
 
 from ..config.kind import kinds
 from ..config.model import Study
-from .keys import installed
+from .keys import version_of
 from .source import COMMIT_FILE, PACKAGE, checksum, clone
 
 SOFTWARE = ("cvxopt h5netcdf h5py meshio netgen-mesher numba numpy pyamg scikit-fem scipy snakemake xarray").split()
@@ -32,7 +32,7 @@ PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2
 def attributes(study: Study, package: Path = PACKAGE) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
+    software = {name: version_of(name) for name in (*SOFTWARE, *_plugins(study))}
     software["python"] = platform.python_version()
     found = {
         "title": study.title,
@@ -57,7 +57,7 @@ def attributes(study: Study, package: Path = PACKAGE) -> dict[str, str]:
 def _plugins(study: Study) -> set[str]:
     """Distributions of the definitions, mesh types and loads of other packages that a study uses."""
     used = {label for labels in study.axes.values() for label in labels}
-    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
+    tables: tuple[ExtensibleMapping[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
     return {package for table in tables for name, package in table.packages.items() if name in used}
 
 

@@ -26,7 +26,7 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 
 
-READ: "list[tuple[Study, dict[str, Job]]]" = []
+STUDIES_READ: "list[tuple[Study, dict[str, Job]]]" = []
 """Studies that this process runs, with all their jobs: the requested one, and those that the paper reads."""
 
 
@@ -48,7 +48,7 @@ def output_files(output: "Output", study: "Study") -> list[str]:
     return figures + [f"{output.into}/{name}" for name in names]
 
 
-def linked(study: "Study") -> list[str]:
+def linked_files(study: "Study") -> list[str]:
     """Files that the page to browse links to, relative to the study's folder."""
     made = (path for members in output_jobs(study).values() for one in members for path in output_files(one, study))
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
@@ -90,7 +90,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
 def _browse_digest(study: "Study") -> str:
     assets = {path.name: checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())}
     return hash_of(
-        linked(study), [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))], assets
+        linked_files(study), [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))], assets
     )
 
 
@@ -107,7 +107,7 @@ def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
 MISSING = " is missing"
 
 
-def fault(job: Job) -> str:
+def rerun_reason(job: Job) -> str:
     """Return why a job must run, or an empty string; jobs before it count only by their products."""
     if not job.record.exists():
         return "not done yet"
@@ -130,6 +130,6 @@ def outdated(study: "Study", folder: Path) -> dict[Path, str] | None:
     """Return the records of done jobs that must run again, with the reasons; None if a job was never done."""
     if not (folder / TASKS).exists():  # never run: planning 10,000 scenes takes a second
         return None
-    faults = {job.record: why for job in jobs(study, folder).values() if (why := fault(job))}
+    faults = {job.record: why for job in jobs(study, folder).values() if (why := rerun_reason(job))}
     known = {record: why for record, why in faults.items() if record.exists()}
     return known if len(known) == len(faults) else known or None

@@ -54,11 +54,11 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
         raise DamagedError(path, f"it is damaged ({reason})") from None
 
 
-def stored(path: str | Path) -> set[str]:
+def stored_keys(path: str | Path) -> set[str]:
     """Keys of stored results."""
     if not Path(path).exists():
         return set()
-    return set(everything(path))
+    return set(read_all(path))
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
@@ -75,7 +75,7 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
     return results
 
 
-def everything(path: str | Path) -> dict[str, dict[str, Any]]:
+def read_all(path: str | Path) -> dict[str, dict[str, Any]]:
     """Read the scalars of all results of a file."""
     with _opened(path) as (_, scalars):
         return scalars
@@ -86,11 +86,11 @@ def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[s
     return read(Path(folder) / f"{key}.h5", [key], fields)[key]
 
 
-KEPT_BACK = 5.0
-"""Seconds between writes of a `Keeper`: writing costs as much as computing small results."""
+SECONDS_BETWEEN_WRITES = 5.0
+"""Seconds between writes of a `ResultBuffer`: writing costs as much as computing small results."""
 
 
-class Keeper:
+class ResultBuffer:
     """Context that stores results at intervals and at its end, so that a failure loses little."""
 
     def __init__(self, path: str | Path) -> None:
@@ -104,7 +104,7 @@ class Keeper:
 
     def __setitem__(self, key: str, result: Mapping[str, Any]) -> None:
         self.results[key] = result
-        if time.perf_counter() > self.since + KEPT_BACK:
+        if time.perf_counter() > self.since + SECONDS_BETWEEN_WRITES:
             self._write()
 
     def _write(self) -> None:
@@ -121,7 +121,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "results.h5"
     ...     add(path, {"one": {"displacement": 1.25e-3, "field": np.arange(3.0)}})
-    ...     read(path, stored(path), ["field"])
+    ...     read(path, stored_keys(path), ["field"])
     {'one': {'displacement': 0.00125, 'field': array([0., 1., 2.])}}
     """
     if not results:
@@ -132,7 +132,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     # In memory: what is on the disk is written at once. The image of an open file has a stale checksum before HDF5 2.
     image = io.BytesIO()
     with h5py.File(image, "w", libver="latest") as file:
-        if stored(path):
+        if stored_keys(path):
             with _opened(path) as (before, known):
                 scalars = {name: kept for name, kept in known.items() if name not in results}
                 for name in before:

@@ -27,7 +27,7 @@ from springtune.scene.mesh_cache import MeshCache
 from springtune.scene.motion import motion_of
 from springtune.springs.base import DefinitionError
 
-from ...runs.attempts import own_reason
+from ...runs.attempts import failure_reason
 from . import PARTS, THREAD_COUNTS
 from .approaches import APPROACHES, network
 
@@ -157,7 +157,7 @@ def _measure_case(scene, approach, size):
     except MemoryError:
         return _failed_case("not enough memory: the machine has no more")
     except Exception as error:  # the other cases shall still be measured
-        why = own_reason(error)
+        why = failure_reason(error)
         if not why:
             raise
         traceback.print_exc()

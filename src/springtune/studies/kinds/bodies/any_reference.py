@@ -40,7 +40,7 @@ def read_interpolant(folder, key):
 def _read_interpolant(path, key, state):
     """Cache of `read_interpolant` by the size and time of the file."""
     arrays = ("aspect_range", "nu_range", "values")
-    results = store.read(path, {key} | (store.stored(path) if state else set()), arrays)
+    results = store.read(path, {key} | (store.stored_keys(path) if state else set()), arrays)
     known = results.pop(key)
     if "solves" not in known:
         return None, results, 0.0, known["message"]

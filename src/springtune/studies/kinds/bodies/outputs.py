@@ -7,7 +7,7 @@ from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
 from ...config.kind import stem as figure_stem
-from ...config.model import once_a_study
+from ...config.model import cache_by_study
 from ...output.browse import Plot, View, particle_plots
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def stem(selection: Mapping[str, str], number: int | None = None) -> str:
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE_LABELS)
 
 
-@once_a_study
+@cache_by_study
 def stems(study: "Study") -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
@@ -51,7 +51,7 @@ def stems(study: "Study") -> list[str]:
     return found
 
 
-@once_a_study
+@cache_by_study
 def pressed(study: "Study") -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)

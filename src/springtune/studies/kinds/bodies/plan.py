@@ -13,7 +13,7 @@ from springtune.reference.answers import unit_problem, unit_scales
 from springtune.springs.base import DEFINITIONS
 
 from ...config.kind import Stage
-from ...config.model import keeps_fields, once_a_study, shown
+from ...config.model import cache_by_study, keeps_fields, shown
 from ...runs import attempts
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task
@@ -53,19 +53,19 @@ def _group_by(items, key):
     return dict(groups)
 
 
-@once_a_study
+@cache_by_study
 def scenes_by_mesh(study):
     """Scenes of a study by their mesh."""
     return _group_by(study.scenes, attrgetter("mesh"))
 
 
-@once_a_study
+@cache_by_study
 def curves_by_mesh(study):
     """Sensitivity curves of a study by their mesh."""
     return _group_by(study.curves, attrgetter("mesh"))
 
 
-@once_a_study
+@cache_by_study
 def shape_scenes_by_mesh(study):
     """Scenes of shapes by the stem of their mesh, which differs from those of beams."""
     return _group_by(study.shapes.scenes if study.shapes else (), shape_stem)
@@ -86,7 +86,7 @@ NU_STEP = 0.05
 """Distance of the ends of ranges of Poisson's ratio [1]."""
 
 
-@once_a_study
+@cache_by_study
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
@@ -230,7 +230,7 @@ def finite_problem(reference, kind):
     return found | {"beam": beam_key(reference.beam), "material": material_key(reference.material)}
 
 
-@once_a_study
+@cache_by_study
 def scene_tasks(study):
     """Tasks of a study's scenes by mesh, in the order of `scenes_by_mesh`.
 
@@ -291,13 +291,13 @@ def curve_task(study, curve):
     return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.bodies.sensitivity"))} | task
 
 
-@once_a_study
+@cache_by_study
 def shown_scenes(study):
     """Scenes whose whole fields are stored, chosen from the whole study."""
     return shown(study.scenes, study.swept)
 
 
-@once_a_study
+@cache_by_study
 def calibrating(study):
     """Curves that calibrate each group of scenes."""
     chosen = (one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration)
@@ -309,7 +309,7 @@ def calibration_name(scene):
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
 
 
-@once_a_study
+@cache_by_study
 def calibrations(study):
     """Tasks of the groups of scenes that share a calibrated stiffness, all in one job and file."""
 
@@ -346,7 +346,7 @@ def shape_particles(study, one):
     return FILE_PARTICLES if shape.file else particles(shape.area, one.mesh_size)
 
 
-@once_a_study
+@cache_by_study
 def drawn_scenes(study):
     """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
     found = set()

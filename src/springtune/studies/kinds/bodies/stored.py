@@ -75,7 +75,7 @@ def _groups_as_lists(grouped: GroupedMesh) -> dict[str, Any]:
 def is_stored(folder: str | Path, name: str, key: str) -> bool:
     """Whether a mesh, or the reason why it cannot be made, is stored."""
     path, notes = files(folder, name)
-    if NOTES_KEY not in store.stored(notes):
+    if NOTES_KEY not in store.stored_keys(notes):
         return False
     known = read_notes(folder, name)
     return bool(known["key"] == key and ("message" in known or path.exists()))
@@ -149,7 +149,7 @@ CALIBRATION_STEM = "calibration"
 def read_calibration(folder: str | Path) -> dict[str, Any]:
     """Calibrated stiffnesses of a study [N/m] by key; none where nothing is calibrated."""
     path = Path(folder) / "curves" / f"{CALIBRATION_STEM}.h5"
-    return store.everything(path) if path.exists() else {}
+    return store.read_all(path) if path.exists() else {}
 
 
 def stored_key(scene: dict[str, Any], calibration: dict[str, Any]) -> str:

@@ -23,7 +23,7 @@ REFERENCE_TOLERANCE = 1e-4
 
 def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> None:
     """Build a missing interpolant; if it meets no tolerance, solve its unit problems one by one."""
-    if task["key"] not in store.stored(path):
+    if task["key"] not in store.stored_keys(path):
         begin = time.perf_counter()
         result = attempts.attempt(task["key"], partial(_build_interpolant, task), partial(failed, task))
         if result is None:
@@ -31,12 +31,12 @@ def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> 
         result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
         store.add(path, {task["key"]: result})
         attempts.computed += 1
-    known = store.stored(path)
+    known = store.stored_keys(path)
     if "solves" in store.read(path, [task["key"]])[task["key"]]:
         return
     missing = [key for key in task["problems"] if key not in known]
     # Those that share elements follow each other.
-    with store.Keeper(path) as keeper:
+    with store.ResultBuffer(path) as keeper:
         for key in sorted(missing, key=lambda key: task["problems"][key]):
             begin = time.perf_counter()
             problem = {"problem": (*task["problems"][key], task["kind"])}

@@ -9,13 +9,13 @@ from pydantic import Field
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
-from springtune.registry import imported
+from springtune.registry import import_name
 from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Stage, StudyKind
-from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
+from ...runs.keys import beam_key, declared_key, definition_key, distribution, material_key, mesh_type_key, version_of
 from ...runs.plan import Task
 from . import SETTING
 from .outputs import OUTPUTS
@@ -117,9 +117,8 @@ class EngineRun:
 
 
 def _engines():
-    # By name, since no dataset of other studies is to depend on the modules of engines.
     """Engines by name, imported late: datasets of other studies must not depend on their modules."""
-    return imported("engines.base:ENGINES")
+    return import_name("engines.base:ENGINES")
 
 
 def _check(config, problems):
@@ -135,7 +134,7 @@ def _check(config, problems):
         for engine in runs.engine:
             checks.check_known(problems, (*place, "engine"), "engine", engine, _engines(), None)
         try:
-            imported("engines.base:Setting")(max(runs.dt))
+            import_name("engines.base:Setting")(max(runs.dt))
         except ValueError as error:
             problems.add((*place, "dt"), str(error).removeprefix("dt: "))
         for one in runs.scene or section.scenes:
@@ -179,7 +178,7 @@ def _summary(runs):
 def _version(engine):
     """Versions of the packages that an engine needs, or "none"; a new version runs the engine again."""
     names = (distribution(need.partition(">=")[0]) for need in engine.needs)
-    return ", ".join(f"{name} {installed(name)}" for name in names)
+    return ", ".join(f"{name} {version_of(name)}" for name in names)
 
 
 def _tasks(study):

@@ -35,7 +35,7 @@ def run(content, attempts):
     waiting = []
     for file in content["files"]:
         path = Path(content["folder"]) / f"{file['name']}.h5"
-        present = store.stored(path)
+        present = store.stored_keys(path)
         if not {DRAWN, *file["results"]} <= present:
             waiting.append(_Block(file, path, present))
     for begin in range(0, len(waiting), TASKS_TOGETHER):

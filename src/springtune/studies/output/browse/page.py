@@ -23,7 +23,7 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from springtune.registry import imported
+from springtune.registry import import_name
 from springtune.safe_io.atomic import write_json, write_text
 
 from ...config.kind import modules
@@ -40,7 +40,7 @@ LIBRARY = ("bokeh", "bokeh-api")
 
 def views() -> dict[str, View]:
     """Views that the study kinds declare."""
-    return {view.group: view for name in modules("outputs") for view in getattr(imported(name), "VIEWS", ())}
+    return {view.group: view for name in modules("outputs") for view in getattr(import_name(name), "VIEWS", ())}
 
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
