@@ -454,9 +454,7 @@ class TestDatasets:
         with h5py.File(mesh, "r+") as file:
             file["elsewhere"] = h5py.SoftLink("/ENS_MAA")
             del file[name]
-        with pytest.raises(
-            MeshError, match="'elsewhere' is a soft link; links and other files are not followed: write the array"
-        ):
+        with pytest.raises(MeshError, match="'elsewhere' is a soft link; links and other files are not followed"):
             read_beam_mesh(mesh, 0.1, 0.02)
 
     @pytest.mark.parametrize(
