@@ -183,29 +183,6 @@ def test_a_shape_is_calibrated_under_its_load_cases():
     assert "prescribes displacements" in move.message and np.isnan(move.errors).all()
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"loads": ["pull"]}, "loads: 'pull' cannot be predicted"),
-        ({"precision": "float16"}, "precision: 'float16' is unknown to engine 'xpbd'; give one of float64, float32"),
-        *(
-            ({name: value}, f"{name}: {value} is not a whole number above zero; give one")
-            for name in ("substeps", "iterations", "frames")
-            for value in (0, -3, 0.5, True)
-        ),
-        *(({name: 10**9}, f"{name}: 1000000000 is more than 100000") for name in ("substeps", "iterations")),
-        ({"substeps": 100000, "iterations": 100000}, "dt: .* are over 1e[+]09 iterations"),
-        ({"dt": 1e-9, "substeps": 100}, "dt: .* are over 1e[+]09 iterations"),
-        ({"dt": 60}, "dt: 60 s is longer than 1 s; give the time of a frame such as 1/60"),
-        ({"dt": 0.0}, "dt: 0.0 is not above zero"),
-    ],
-)
-def test_a_wrong_call_is_refused(options, said):
-    for call in (st.fit_engine, st.in_engine)[: 1 + ("loads" not in options)]:
-        with pytest.raises(ValueError, match=said):
-            call(BASE, "xpbd", **options)
-
-
 def test_no_engine_moves_what_its_order_decides(engine):
     """A factor is right for any order of the particles, or there is none."""
     engine.unordered = 0.01

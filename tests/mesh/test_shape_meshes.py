@@ -148,28 +148,6 @@ def test_a_shape_far_from_the_origin_is_meshed_alike():
     assert mesh_shape(far, 0.1).mesh.area == pytest.approx(1, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("shape", "size", "refined", "says"),
-    [
-        (plate(), "50 mm", {}, "mesh size: 0.05 is larger than shape 'plate'; give at most"),
-        (plate(), "1 um", {}, "makes some 4.4e+09 particles of shape 'plate', more than can be meshed"),
-        (plate(), 0, {}, "mesh size: 0 is not above zero"),
-        (plate(), math.nan, {}, "size: nan is not a"),
-        (plate(), "5 mm", {"hoel": 1e-3}, "refined 'hoel': shape 'plate' has no side"),
-        (plate(), "5 mm", {"hole": "6 mm"}, "larger than the mesh size"),
-        (plate(), "5 mm", {"hole": "1 kN"}, "refined 'hole': '1 kN' is a force"),
-        (plate(), "5 mm", {"hole": "1 nm"}, "less than some millionths of shape"),
-        (plate(), "5 mm", {"core": "2 um"}, "with {'core': 2e-06} makes some 2.3e+07 part"),
-        (Shape("own", 1, file="own.msh"), "5 mm", {}, "that of the file own.msh; read it with"),
-        (st.Beam(1, 1), "5 mm", {}, "shape: Beam(length=1.0"),
-    ],
-)
-def test_what_cannot_be_meshed_is_refused(shape, size, refined, says):
-    with pytest.raises(ValueError) as caught:
-        st.mesh_shape(shape, size, refined=refined)
-    assert says in str(caught.value)
-
-
 def same(grouped, other):
     """Whether two meshes have the same groups, by places."""
 

@@ -229,22 +229,6 @@ class TestWhatIsNotFound:
 
 
 class TestArguments:
-    @pytest.mark.parametrize(
-        ("wrong", "values", "message"),
-        [
-            ("error", ["1", "x %", "-1 %", "0 %", "100 %", "nan %", "inf %", "1 mm", 0, 1, -0.1, 5, None, True, [1]],
-             "error: .* is no error above 0 and below 100 %; give one such as '1 %'"),
-            ("mesh_types", ["structured", [], ["triangles"], 3, [["free"]], [None]], "mesh types: .*(structured|give)"),
-            ("most", [0, -1, 1.5, "many", None], "most: .* is no number of particles; give one such as 20000"),
-            ("beam", ["200x40"], "beam: "),
-            ("material", ["steel"], "material: "),
-        ],
-    )  # fmt: skip
-    def test_what_is_wrong_is_named(self, wrong, values, message):
-        for value in values:
-            with pytest.raises(ValueError, match=f"^{message}"):
-                find_mesh(**{"beam": BEAM, "material": STEEL, "error": "1 %"} | {wrong: value})
-
     @pytest.mark.parametrize(("text", "error"), [("1 %", 0.01), (" 0.5% ", 0.005), ("1e-1 %", 0.001), (0.02, 0.02)])
     def test_errors(self, text, error):
         assert asked_error(text) == pytest.approx(error, rel=1e-9)

@@ -83,37 +83,6 @@ def test_a_laminate_is_the_mean_of_its_plies():
 # -- refusals ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: AnisotropicMaterial("9 GPa", "4 GPa", "7 GPa", "2 GPa"), r"C12 is 7e\+09.*sqrt\(C11 C22\) = 6e\+09"),
-        (lambda: AnisotropicMaterial("9 GPa", "4 GPa", "-6 GPa", "2 GPa"), r"C12 is -6e\+09"),
-        (
-            lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 1.0, C16=3.0),
-            "C66 is 1 Pa.*above 1 Pa.*correct it, or the other two",
-        ),
-        (lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 0.0), "C66: 0.0 is not above zero"),
-        (lambda: AnisotropicMaterial("9 mm", 4.0, 0.0, 1.0), "C11: '9 mm' is a length; give a stress"),
-        (lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 1.0, density=-1), "density: -1 is not above zero"),
-        (lambda: AnisotropicMaterial(9.0, 4.0, math.nan, 1.0), "C12: nan is not a finite number"),
-        (lambda: AnisotropicMaterial.orthotropic(16.0, 1.0, 4, 1.0), r"poisson_ratio_xy is 4.*= 4; give the ratio"),
-        (lambda: AnisotropicMaterial.orthotropic(16.0, 1.0, "x", 1.0), "poisson_ratio_xy is 'x'"),
-        (
-            lambda: AnisotropicMaterial.orthotropic(16.0, 1.0, 0.3, 1.0, "3 mm"),
-            "angle: '3 mm' is a length; give an angle",
-        ),
-        (lambda: AnisotropicMaterial.laminate([]), "plies: there are none"),
-        (lambda: AnisotropicMaterial.laminate([(PLY, 0)]), "ply 0: .* is none; give a material, an angle"),
-        (lambda: AnisotropicMaterial.laminate([(PLY, 0, -1)]), "thickness of ply 0: -1 is not above zero"),
-        (lambda: AnisotropicMaterial.of(np.eye(2)), "no symmetric array of shape"),
-        (lambda: AnisotropicMaterial.of([[1, 2, 0], [0, 1, 0], [0, 0, 1]]), "no symmetric array of shape"),
-    ],
-)
-def test_what_is_no_material_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
 @given(st.lists(st.floats(-2, 2), min_size=6, max_size=6))
 def test_what_is_accepted_is_positive_definite_and_nothing_else(numbers):
     c11, c22, c12, c66, c16, c26 = numbers

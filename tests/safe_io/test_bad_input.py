@@ -115,35 +115,7 @@ def test_no_mesh_is_made_of_a_box_that_is_none(make, box):
         make(*box)
 
 
-@pytest.mark.parametrize(
-    "call", [lambda: lattice(0, 3), lambda: lattice(3, 2.5), lambda: isosceles(0.1, 0.02, 5e-3, 0.0)]
-)
-def test_no_rows_are_made_that_are_none(call):
-    with pytest.raises(MeshError, match="; give"):
-        call()
-
-
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-HALVES = np.array([[0, 1, 2], [0, 2, 3]])
-
-
-@pytest.mark.parametrize(
-    ("points", "triangles", "says"),
-    [
-        (POINTS[:, :1], HALVES, r"points: float64 of shape \(4, 1\); give"),
-        ("x", HALVES, "points: str; give"),
-        (POINTS, HALVES.astype(float), "triangles: float64"),
-        (POINTS, np.zeros((0, 3), dtype=int), "there are no cells"),
-        (POINTS * [1, np.nan], HALVES, "points: 4 are nowhere, the first one 0"),
-        (POINTS, HALVES[:, ::-1], r"cells of 3 corners that are clockwise or have no area: 2, the first one 0 at"),
-        (POINTS, np.array([[0, 1, 2], [0, 0, 3]]), "have no area: 1, the first one 1"),
-        (POINTS, np.array([[0, 1, 2], [0, 2, 4]]), r"cell 1 has corners \[0, 2, 4\], and points are 0 to 3"),
-        (POINTS, np.array([[0, 1, 2], [-1, 0, 2]]), r"cell 1 has corners \[-1, 0, 2\]"),
-    ],
-)
-def test_a_mesh_of_arrays_that_are_none_is_refused(points, triangles, says):
-    with pytest.raises(MeshError, match=says):
-        Mesh(points, triangles)
 
 
 def of_cells(mesh, kept, corners=3):

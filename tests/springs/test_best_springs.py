@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.cli import main
-from springtune.mesh import MESH_TYPES, Mesh, lattice
+from springtune.mesh import lattice
 from springtune.springs import DEFINITIONS
 from springtune.springs.best_springs import DISPLACEMENT_WEIGHT, STRETCH_WEIGHT, LoadSpace
 
@@ -152,29 +152,6 @@ def test_they_are_of_their_own_mesh():
     with pytest.raises(st.DefinitionError, match="of one mesh, material and thickness; search again"):
         st.Scene(BEAM, other, THIRD, "traction", 1.0, definition=found()).springs  # noqa: B018
     assert not st.best_springs(space(1 / 3, True).mesh, THIRD, "1 mm", starts=["lattice"], evaluations=5).errors
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"mesh": 3}, "mesh: 3 is not a Mesh"),
-        ({"mesh": MESH_TYPES["braced"](0.06, 0.02, 5e-3)}, "needs triangles and the mesh has quadrilaterals"),
-        ({"mesh": Mesh(np.array([[0, 0], [1, 0], [0, 1], [5, 0], [6, 0], [5, 1.0]]), np.array([[0, 1, 2], [3, 4, 5]]))},
-         "the mesh has 2 parts"),
-        ({"mesh": Mesh(np.array([[0, 0], [1, 0], [0, 1.0]]), np.array([[0, 1, 2]]))}, "15 loads to fit, too many for"),
-        ({"material": st.AnisotropicMaterial(9.0, 4.0, 1.5, 2.0)}, "material: best springs are of isotropic ones"),
-        ({"thickness": "-1 mm"}, "thickness: '-1 mm' is not above zero"),
-        ({"reach": "0 mm"}, "reach: '0 mm' is not above zero"),
-        ({"starts": "lattice"}, "starts: 'lattice' is no list of definitions"),
-        ({"starts": []}, "starts: .* is no list of definitions"),
-        ({"starts": ["latice"]}, "starts: 'latice' is unknown"),
-        ({"starts": ["paper"]}, "definition 'paper': stiffness: None"),
-        ({"evaluations": 0}, "evaluations: 0 is not a whole number above zero"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_is_named(changes, said):
-    with pytest.raises(ValueError, match=said):
-        st.best_springs(**({"mesh": space().mesh, "material": THIRD, "thickness": "1 mm"} | changes))
 
 
 def test_predict_shows_them_if_asked(capsys):

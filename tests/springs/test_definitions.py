@@ -15,7 +15,7 @@ from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, lattice
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
-from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
+from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.element_fit import least_squares
 from springtune.springs.lattice import predicted_stiffness
 
@@ -266,45 +266,12 @@ def test_lloyds_squares_may_be_off_by_two_percent():
     assert DEFINITIONS["lloyd"].springs(slender(1.015), Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
 
 
-@pytest.mark.parametrize(
-    ("make", "values", "message"),
-    [
-        (
-            lambda thickness: DEFINITIONS["lattice"].springs(lattice(2, 2), Material(1.0, 0.3), thickness),
-            (0.0, -1.0, True, "1 mm", np.nan, np.inf),
-            "thickness: .* is not a number above zero",
-        ),
-        (
-            lambda reference: Springs(reference, np.ones(3)),
-            (0.0, np.inf, np.nan, True, "1 N/m"),
-            "reference stiffness .* is not a number above zero",
-        ),
-        (
-            lambda relative: Springs(1.0, relative),
-            ([1.0], np.ones((2, 1)), np.array([1.0, np.nan]), np.array([np.inf])),
-            r"(?s)relative stiffnesses .* are not finite",
-        ),
-    ],
-)
-def test_what_is_no_stiffness_or_thickness_is_refused(make, values, message):
-    for value in values:
-        with pytest.raises(DefinitionError, match=message):
-            make(value)
-
-
 @pytest.mark.parametrize("name", ["lattice", "patch", "patch-fit", "element-fit", "energy-fit", "area", "delingette"])
 def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
     mesh, steel = MESH_TYPES["structured"](0.03, 0.01, 2.5e-3), Material(210e9, 0.3, name="steel")
     thin, thick = (DEFINITIONS[name].springs(mesh, steel, thickness) for thickness in (1e-3, 3e-3))
     # The product is rounded twice.
     np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-9)
-
-
-@pytest.mark.parametrize("wrong", [{"cells": (5,)}, {"cells": ()}, {"cells": "34"}, {"needs": "luck"}], ids=repr)
-def test_what_is_no_declaration_is_refused(wrong):
-    with pytest.raises(ValueError, match="definition 'none of ours': .*; give"):
-        definition("none of ours", **wrong)(lambda mesh, material, thickness: None)
-    assert "none of ours" not in DEFINITIONS
 
 
 @pytest.mark.parametrize("corner", [[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], ids=str)
