@@ -122,12 +122,14 @@ $(VENV)/.test: requirements/test.txt $(VENV)/.run
 # Versions and hashes of all packages, and their licences in docs/licences.csv. uv does not read pip's configuration, so the
 # indexes, where pip has some of its own, are handed on, and are equal, as to pip.
 LOCK = uv pip compile --quiet --index-strategy unsafe-best-match --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
+# Extras that the tests need, besides the group `test`.
+TESTED = --extra archive --extra cholesky --extra export --extra mujoco --extra paper
 lock: export UV_DEFAULT_INDEX ?= $(shell pip config get global.index-url 2>/dev/null)
 lock: export UV_INDEX ?= $(shell pip config get global.extra-index-url 2>/dev/null)
 lock: $(VENV)/.test
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra archive --extra paper --output-file requirements/run.txt
-	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+	$(LOCK) pyproject.toml requirements/build.in $(TESTED) --group pyproject.toml:test --constraints requirements/run.txt --output-file requirements/test.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) requirements/engines.in --constraints requirements/test.txt --output-file requirements/engines.txt
 	python tools/licences.py

@@ -26,7 +26,8 @@ from tables import STUDIES
 REPOSITORY = Path(__file__).parents[2]
 PROGRAM = Path(__file__).with_name("computed.py")
 
-DECLARED = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())
+DECLARED = PROJECT["project"]
 
 NEEDED = [*DECLARED["dependencies"], *DECLARED["optional-dependencies"]["cholesky"]]
 NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
@@ -35,8 +36,7 @@ NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
 SNAKEMAKE = [one for one in DECLARED["dependencies"] if one.startswith("snakemake")]
 """Snakemake and the interface of its loggers."""
 
-TESTERS = DECLARED["optional-dependencies"]["test"]
-TESTERS = [one for one in TESTERS if re.match("hypothesis|meshlane|mujoco|pytest", one)]
+TESTERS = [one for one in PROJECT["dependency-groups"]["test"] if re.match("hypothesis|meshlane|pytest", str(one))]
 
 PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.search(r":: 3\.\d+$", one)]
 """Versions of Python that are supported."""
