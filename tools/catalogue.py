@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import springtune as st
-from springtune.handover.simulation import WORDS
+from springtune.handover.simulation import ENERGY_WORDS
 from springtune.handover.terms import terms_of
 from springtune.linalg.factors import SingularError
 from springtune.mesh import lattice
@@ -201,7 +201,7 @@ def _cost(mesh: st.Mesh, springs: Springs) -> str:
     for energy in springs.energies:
         kind = terms_of(energy, mesh, 1.0).kind
         each = energy.corners.shape[1] if kind in ("angle", "corner") else 1
-        counts[WORDS[kind]] = counts.get(WORDS[kind], 0) + each * len(energy.corners)
+        counts[ENERGY_WORDS[kind]] = counts.get(ENERGY_WORDS[kind], 0) + each * len(energy.corners)
     said = [f"{word} {count / len(mesh.points):.1f}" for word, count in counts.items() if count]
     return ", ".join([*said, *[f"solves {springs.evaluations}"] * bool(springs.evaluations)])
 

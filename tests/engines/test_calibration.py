@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.engines.calibration import SIZES, runnable
+from springtune.engines.calibration import LOAD_SHARES, best_runnable_scene
 from springtune.engines.run import reordered
 from springtune.handover.newton import LAWS, membrane_energies
 from springtune.handover.simulation import simulate
@@ -62,7 +62,7 @@ def answered(number):
     found = run(scene, fit.factor)
     assert abs(found.error) < 0.02, (number, found)
     for band in fit.bands:
-        at = random.integers(len(SIZES))
+        at = random.integers(len(LOAD_SHARES))
         other = st.Scene(scene.beam, scene.mesh, scene.material, band.load, band.sizes[at], definition=scene.definition)
         assert not abs(run(other, fit.factor).error - band.errors[at]) > 0.02, (number, band)
     return True
@@ -156,9 +156,9 @@ class TestClosedForm:
     def test_the_error_of_a_band_grows_with_its_size(self, engine):
         engine.bent = 0.4
         (band,) = st.fit_engine(BASE, "late", loads=["traction"], needed=False).bands
-        assert band.sizes == pytest.approx([share * 0.2 for share in SIZES])
+        assert band.sizes == pytest.approx([share * 0.2 for share in LOAD_SHARES])
         slope = 0.3 * 0.4 * BASE.solve().displacement / BASE.reference().displacement  # of the error, over the load
-        assert np.diff(band.errors) == pytest.approx(slope * np.diff(SIZES), rel=0.25)
+        assert np.diff(band.errors) == pytest.approx(slope * np.diff(LOAD_SHARES), rel=0.25)
 
 
 def test_a_shape_is_calibrated_under_its_load_cases():
@@ -179,7 +179,7 @@ def test_a_shape_is_calibrated_under_its_load_cases():
     fit = st.fit_engine(scene, "xpbd", substeps=20, needed=False)
     assert abs(fit.error) < 1e-3 and fit.result.reference == pytest.approx(1e-3, rel=0.02)
     pull, lift, move = fit.bands
-    assert pull.sizes == SIZES and np.isfinite(lift.errors).all()
+    assert pull.sizes == LOAD_SHARES and np.isfinite(lift.errors).all()
     assert "prescribes displacements" in move.message and np.isnan(move.errors).all()
 
 
@@ -232,9 +232,9 @@ def test_a_drift_is_said_and_not_recommended():
     fit = st.fit_engine(st.Scene(*case, definition="patch"), "implicit-cg", loads=["traction"], needed=False)
     assert fit.result.drift < -0.5 and "moves across by -" in fit.message
     engine, setting = st.ENGINES["implicit-cg"], st.Setting()
-    best, *_ = runnable(partial(st.Scene, *case), ["traction"], engine, setting, False)
+    best, *_ = best_runnable_scene(partial(st.Scene, *case), ["traction"], engine, setting, False)
     assert best.springs.energies
-    none, why, _ = runnable(partial(st.Scene, *case), ["traction"], engine, setting, True)
+    none, why, _ = best_runnable_scene(partial(st.Scene, *case), ["traction"], engine, setting, True)
     assert none is None and "moves across by" in why and "another type such as 'structured'" in why
 
 

@@ -10,7 +10,7 @@ import pytest
 import springtune as st
 from mechanics import spring_forces
 from springtune.handover.net import SpringNet
-from springtune.handover.simulation import STEP_SHARE, EquilibriumWarning
+from springtune.handover.simulation import STABLE_STEP_SHARE, EquilibriumWarning
 from springtune.mesh import Mesh, signed_areas
 from springtune.springs import DEFINITIONS
 
@@ -192,7 +192,7 @@ def test_the_largest_step_is_sharp(mesh_type, definition, tmp_path):
     one = scene(mesh_type, "traction", definition, force="1 N")
     model, data = loaded(one, tmp_path)
     limit = one.motion().step_limit("symplectic-euler")
-    assert model.opt.timestep == pytest.approx(STEP_SHARE * limit, rel=1e-4)
+    assert model.opt.timestep == pytest.approx(STABLE_STEP_SHARE * limit, rel=1e-4)
     model.dof_damping[:] = model.tendon_damping[:] = 0
     static = np.abs(model.key_qpos[0]).max()
     for share, stable in ((0.99, True), (1.01, False), (1.05, False), (1.5, False)):

@@ -12,7 +12,7 @@ from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
 from springtune.mesh.types import MeshType
-from springtune.prediction.choices import CASES, predict, predicted, references
+from springtune.prediction.choices import USUAL_LOADS, predict, predicted, references
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
@@ -79,7 +79,7 @@ def check(beam, material, mesh):
             assert "unstable" in choice.failures["patch test"] and np.isnan(choice.errors["traction"])
             worst.append(np.inf)
             continue
-        for load in CASES:
+        for load in USUAL_LOADS:
             moved = solved(mesh, beam, springs, load)
             if moved is None or load in choice.failures:
                 assert moved is None and load in choice.failures
@@ -123,7 +123,7 @@ class TestWhatClosedFormsGotWrong:
     def test_an_unstable_network_has_no_number(self):
         """A sheet that grows wider as it is pulled: its area energies are large and negative."""
         *_, found = self.choices("structured", -0.6, also=["area", "patch-area"])
-        assert set(found["area"].failures) == {*CASES, "patch test"}
+        assert set(found["area"].failures) == {*USUAL_LOADS, "patch test"}
         assert all("unstable" in reason for reason in found["area"].failures.values())
         area = found["area"]
         assert np.isnan([*area.errors.values(), area.young_modulus_error, area.poisson_ratio]).all()
@@ -138,7 +138,7 @@ class TestWhatClosedFormsGotWrong:
         for choice in choices:
             assert np.isnan(choice.errors["bending"]) and not choice.failures
             assert choice.worst == max(abs(choice.errors["traction"]), abs(choice.errors["shear"]))
-        nothing = predict(beam, mesh, material, dict.fromkeys(CASES, "none"))
+        nothing = predict(beam, mesh, material, dict.fromkeys(USUAL_LOADS, "none"))
         assert all(choice.worst == np.inf for choice in nothing)
 
     def test_cells_that_no_definition_takes_are_refused(self):
@@ -359,7 +359,7 @@ class TestAllDefinitionsCount:
     def test_what_an_engine_takes(self, engine):
         """The best one of all that an engine takes."""
         from springtune.engines.base import ENGINES, EngineError, Setting
-        from springtune.engines.calibration import runnable
+        from springtune.engines.calibration import best_runnable_scene
         from springtune.engines.run import net_of
 
         beam, rubber = st.Beam("60 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
@@ -372,7 +372,7 @@ class TestAllDefinitionsCount:
             except EngineError:
                 continue
         for springs_alone in (False, True):
-            scene, _, tried = runnable(make, CASES, chosen, setting, springs_alone)
+            scene, _, tried = best_runnable_scene(make, USUAL_LOADS, chosen, setting, springs_alone)
             assert {*worst} <= {*tried}
             able = [one.worst for one in worst.values() if not (springs_alone and one.energies)]
             assert worst[scene.definition.name].worst == pytest.approx(min(able), rel=1e-5)

@@ -6,7 +6,7 @@ import pytest
 import springtune as st
 from counting import counted
 from springtune.prediction.choices import in_order, predicted
-from springtune.prediction.search import FINER, asked_error, find_mesh
+from springtune.prediction.search import FINER_SIZES, asked_error, find_mesh
 from springtune.problem.status import Status
 from springtune.scene.mesh_cache import MeshCache
 
@@ -147,7 +147,7 @@ class TestBetweenWholeDivisions:
         assert search.best
         for one in found_in(search):
             # Those that are promised, and twelve others.
-            for part in (*FINER, *np.random.default_rng(5).uniform(0.5, 1, 12)):
+            for part in (*FINER_SIZES, *np.random.default_rng(5).uniform(0.5, 1, 12)):
                 assert worst(beam, material, one, one.size * part, loads) <= asked_error(error), part
 
     @pytest.mark.slow
@@ -169,7 +169,7 @@ class TestBetweenWholeDivisions:
         for one in found_in(search):
             sizes = [finer.size for finer in one.finer]
             meshes = {st.make_mesh(BEAM, one.mesh_type, size).points.tobytes() for size in (one.size, *sizes)}
-            for part in FINER[::2]:
+            for part in FINER_SIZES[::2]:
                 assert st.make_mesh(BEAM, one.mesh_type, one.size * part).points.tobytes() in meshes
             assert any(finer.cells != int(finer.cells) for finer in one.finer)
 
@@ -178,7 +178,7 @@ class TestBetweenWholeDivisions:
         search = find_mesh(plate, STEEL, "2 %")
         one, known = search.best, search.known["end"].value
         assert any(finer.cells != int(finer.cells) for finer in one.finer)
-        for part in FINER[::2]:
+        for part in FINER_SIZES[::2]:
             mesh, definition = st.mesh_shape(plate, one.size * part), one.choice.definition
             scene = st.Scene(plate, mesh, STEEL, "pull", definition=definition, kinematics="linear")
             assert abs(scene.solve().values["end"] / known - 1) <= 0.02

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.engines.base import EngineAbsentError, release
+from springtune.engines.base import EngineAbsentError, version_numbers
 from springtune.handover.mujoco import elasticity
 
 from engine_scenes import TEN, scene
 
-RELEASE = release(mujoco.__version__)
+RELEASE = version_numbers(mujoco.__version__)
 EXPLICIT = ("mujoco-euler", "mujoco-implicitfast", "mujoco-rk4")
 STRIP = next(case for case in TEN if case[0] == "strip" and case[2] == "bending")
 

@@ -17,7 +17,7 @@ from springtune.problem.rubber import TestDataError
 from springtune.reference.by_constants import ENTRIES, Family
 from springtune.reference.shapes import solve_shape
 from springtune.scene.identify import Model
-from springtune.scene.measured import blocks, stated
+from springtune.scene.measured import blocks, body_of_test
 
 from tables import refused_calls, refused_files
 
@@ -43,7 +43,7 @@ def write(path, head, *columns):
 def curve(path, material, load="traction", noise=0.0, seed=0, angle=0.0):
     """File of a curve of a beam with its transverse displacement, in um, and a zero that is off by 3 um."""
     write(path, "force [N],displacement [um]", [0.0, 1.0], [0.0, 1.0])
-    shape, case, _ = stated(st.MeasuredTest(BEAM, load, path))
+    shape, case, _ = body_of_test(st.MeasuredTest(BEAM, load, path))
     turned = material.rotated(angle) if angle else material
     family = Family(shape, case, None, {"": turned})
     moved = family.solve(np.array([[turned.plane_stress[one]] for one in ENTRIES]))[:, 0]
@@ -67,7 +67,7 @@ def exact(material, load):
     """Finite elements of the beam under 1 N."""
     with NamedTemporaryFile(suffix=".csv") as file:
         write(file.name, "force [N],displacement [um]", [0.0, 1.0], [0.0, 1.0])
-        shape, case, _ = stated(st.MeasuredTest(BEAM, load, file.name))
+        shape, case, _ = body_of_test(st.MeasuredTest(BEAM, load, file.name))
     return solve_shape(shape, case, {"": material})
 
 
@@ -266,7 +266,7 @@ def test_three_curves_tell_three_constants_and_a_usual_ratio_is_assumed(tmp_path
 
 def test_constants_without_influence_have_intervals_without_bounds(tmp_path):
     test = st.MeasuredTest(BEAM, "traction", curve(tmp_path / "c.csv", PLY, noise=1e-6))
-    shape, case, _ = stated(test)
+    shape, case, _ = body_of_test(test)
     family = Family(shape, case, None, {"": PLY})
     start = {"E1": 14e9, "E2": 5e9, "nu12": 0.3, "G12": 2e9}
     *_, half = Model([(family, blocks(test, family, case), 0.0)]).fit(start, list(start))  # of two numbers
@@ -278,7 +278,7 @@ def test_estimates_lie_within_their_intervals_as_often_as_they_say(tmp_path):
     material = st.Material("3 GPa", 0.35)
     file = curve(tmp_path / "c.csv", material)
     test = st.MeasuredTest(BEAM, "traction", file)
-    shape, case, _ = stated(test)
+    shape, case, _ = body_of_test(test)
     family = Family(shape, case, None, {"": material})
     found = blocks(test, family, case)
     model, random = Model([(family, found, 0.0)]), np.random.default_rng(32)

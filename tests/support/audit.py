@@ -43,7 +43,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.scene.mesh_cache import Loading, MeshCache, solved
+from springtune.scene.mesh_cache import Loading, MeshCache, solve_and_judge
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.studies.kinds.bodies.solve import solve as solve_scene
 from springtune.studies.kinds.bodies.solve import solve_beam
@@ -387,7 +387,7 @@ def audit_snap(scene, path=True):
     loading = scaled(Loading(("arch",), held, pattern, given, pressure), force)
     try:
         problem = MeshCache(mesh, arch.thickness).problem(loading, springs)
-        found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
+        found = solve_and_judge(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
     except SingularError:  # springs of no stiffness leave a mechanism
         return []
     if str(found.status) != "solved":

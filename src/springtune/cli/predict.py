@@ -115,12 +115,12 @@ def predict(
 
 def _load_arguments(body: BodyOptions, names: list[str] | None) -> dict[str, Any]:
     """Loads that count, as arguments of the library: loads of a beam, or the load case of a shape."""
-    from ..prediction.choices import CASES, check_beam, check_loads
+    from ..prediction.choices import USUAL_LOADS, check_beam, check_loads
 
     if not body.is_beam:
         return {"load": body.load}
     check_beam(body.body)
-    return {"loads": check_loads(CASES if names is None else names)}
+    return {"loads": check_loads(USUAL_LOADS if names is None else names)}
 
 
 def _shape_problem(body: BodyOptions) -> "ShapeProblem":
@@ -187,13 +187,13 @@ def _recommended_net(body: BodyOptions, definition: str | None, loads: Any, none
 def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
     """Calibration of an engine."""
     from ..engines.base import ENGINES, Setting
-    from ..engines.calibration import fit_engine, runnable
-    from ..prediction.choices import CASES
-    from ..scene.mesh_cache import chosen
+    from ..engines.calibration import best_runnable_scene, fit_engine
+    from ..prediction.choices import USUAL_LOADS
+    from ..scene.mesh_cache import choose
     from ..scene.single import Scene
     from .recommendation import fit_text
 
-    engine = chosen(ENGINES, options["engine"], "engine")
+    engine = choose(ENGINES, options["engine"], "engine")
     names = ("dt", "substeps", "iterations", "precision")
     setting = Setting(**{name: options[name] for name in names if options[name] is not None})
     engine.check(setting)
@@ -202,7 +202,7 @@ def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: li
         raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
     make = partial(Scene, body.body, body.mesh, body.material, body.load, options["force"], scale=options["scale"])
     if options["definition"] is None:
-        scene, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
+        scene, refused, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
     else:
         scene, refused, tried = make(definition=options["definition"]), "", ()
     if scene is None:

@@ -190,7 +190,7 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
 
 def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     """Text of a calibration."""
-    from ..engines.calibration import WITHIN
+    from ..engines.calibration import MOST_SPREAD
 
     about, mesh = fit.scene.boundary_problem, fit.scene.mesh
     lines = [
@@ -201,7 +201,7 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     if fit.bands:
         others = "" if len(fit.bands) == 1 else "; other loads give finite elements the same displacement"
         lines += ["", f"errors at parts of each load{others}:", aligned(fit.bands.table(), left=2)]
-        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > WITHIN / 2]
+        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > MOST_SPREAD / 2]
         if off:
             where = f"under {fit.scene.load}, but not under {', '.join(off)}"
             lines.append(f"The solver has not converged; the factor makes up for it {where}.")

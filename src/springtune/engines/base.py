@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.simulation import WORDS
+from ..handover.simulation import ENERGY_WORDS
 from ..handover.terms import Net
 from ..mechanics.energies import Energy
 from ..mechanics.integrators import PRECISIONS
@@ -24,7 +24,7 @@ from ..problem.quantities import positive
 from ..registry import Declaration, Registry, how_to_install
 from ..safe_io.tables import number_text
 
-MOST_COUNTED, LONG_FRAME = 100_000, 1.0
+MOST_STEPS, LONGEST_FRAME = 100_000, 1.0
 """Most substeps and iterations, and the longest frame [s]."""
 
 
@@ -36,7 +36,7 @@ def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
     return float(value)
 
 
-def count(value: Any, name: str, most: int = MOST_COUNTED) -> int:
+def count(value: Any, name: str, most: int = MOST_STEPS) -> int:
     """Return a whole number above zero, up to the most that is run."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
         raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
@@ -102,9 +102,9 @@ class Setting:
             above, below = map(int, dt.split("/"))
             dt = above / below if below else 0.0
         object.__setattr__(self, "dt", positive(dt, "time", "dt"))
-        if self.dt > LONG_FRAME:
+        if self.dt > LONGEST_FRAME:
             raise ValueError(
-                f"dt: {self.dt:g} s is longer than {LONG_FRAME:g} s; give the time of a frame such as 1/60"
+                f"dt: {self.dt:g} s is longer than {LONGEST_FRAME:g} s; give the time of a frame such as 1/60"
             )
         for name in ("substeps", "iterations"):
             object.__setattr__(self, name, count(getattr(self, name), name))
@@ -149,7 +149,7 @@ class Parameter:
     formula: str
 
 
-SPRING = Parameter("N/m", "k of the definition, one for each spring")
+SPRING_STIFFNESS = Parameter("N/m", "k of the definition, one for each spring")
 """Stiffness of a spring."""
 
 
@@ -226,7 +226,7 @@ class Engine(Declaration):
     extra: str = ""
     laws: tuple[str, ...] = ()
     precisions: tuple[str, ...] = PRECISIONS
-    parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
+    parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING_STIFFNESS})
     iterates: bool = True
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False
@@ -238,7 +238,7 @@ class Engine(Declaration):
     @property
     def absent(self) -> str:
         """Why it cannot run here, and how to install it; empty where it can."""
-        lacking = [need for need in self.needs if not _there(need)]
+        lacking = [need for need in self.needs if not _is_installed(need)]
         if not lacking:
             return ""
         return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}"
@@ -264,8 +264,8 @@ class Engine(Declaration):
                 f"precision: '{setting.precision}' is unknown to engine '{self.name}'; give one of {known}"
             )
         if net is not None:
-            if lacking := _lacking(self, net):
-                others = [one.name for one in ENGINES.values() if not _lacking(one, net)]
+            if lacking := _missing_energies(self, net):
+                others = [one.name for one in ENGINES.values() if not _missing_energies(one, net)]
                 raise EngineError(
                     f"engine '{self.name}' has no {' and no '.join(lacking)}; take another definition, or engine "
                     f"{' or '.join(others) or 'none of these'}"
@@ -321,25 +321,25 @@ class Engine(Declaration):
         return session
 
 
-def release(text: str) -> tuple[int, ...]:
+def version_numbers(text: str) -> tuple[int, ...]:
     """Numbers of a version, such as (3, 13)."""
     return tuple(int(part) for part in text.split(".") if part.isdigit())
 
 
-def _there(need: str) -> bool:
+def _is_installed(need: str) -> bool:
     """Whether a module is installed, in the version that is asked for."""
     name, _, least = need.partition(">=")
     if find_spec(name) is None:
         return False
     try:
-        return not least or release(metadata.version(name)) >= release(least)
+        return not least or version_numbers(metadata.version(name)) >= version_numbers(least)
     except metadata.PackageNotFoundError:  # installed under another name
         return True
 
 
-def _lacking(engine: Engine, net: SpringNet) -> list[str]:
+def _missing_energies(engine: Engine, net: SpringNet) -> list[str]:
     """Words for what a net has and an engine has not."""
-    return [WORDS[one.kind] for one in net.energies if one.kind not in engine.laws]
+    return [ENERGY_WORDS[one.kind] for one in net.energies if one.kind not in engine.laws]
 
 
 ENGINES: Registry[Engine] = Registry(__package__, "engine", "engines")

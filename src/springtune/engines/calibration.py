@@ -23,34 +23,34 @@ from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.boundary_problem import ShapeProblem, unit_reference
 from ..scene.single import Scene
 from .base import ENGINES, Engine, EngineError, Setting
-from .run import DRIFT, EngineResult, complete, drift, in_engine, net_of
+from .run import MOST_DRIFT, EngineResult, drift, in_engine, net_of, with_precision
 
-SIZES = (0.25, 0.5, 1.0, 2.0)
+LOAD_SHARES = (0.25, 0.5, 1.0, 2.0)
 """Sizes of a load that a calibration is tried on, over its own."""
 
-WITHIN = 0.05
+MOST_SPREAD = 0.05
 """Error up to which orders of the particles may differ from each other, and loads from a converged setting."""
 
-TUNED, ALLOWED = 1e-3, 0.02
+FACTOR_ERROR, MOST_FACTOR_ERROR = 1e-3, 0.02
 """Error at which a factor is taken, and above which it is refused where nothing comes closer."""
 
-BRACKET, BRACKETS, SATURATED = 8.0, 7, 1e-3
+BRACKET_RATIO, MOST_BRACKETS, SATURATED_CHANGE = 8.0, 7, 1e-3
 """Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
 which stiffness no longer decides."""
 
 TRIED_ORDERS = 4
 """Orders of particles, springs and cells that a calibration is tried in."""
 
-DAMPED = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
+DAMPING_NOTE = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
 """What is said of a run's damping."""
 
-RESTING = {"float64": 1e-4, "float32": 1e-3}
+RUN_TOLERANCES = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
 
-SHAKE = 5e-3
+MOST_SWING = 5e-3
 """Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
 
-CONVERGED, STALLED, MOST_DOUBLINGS = 0.01, 0.9, 8
+CONVERGED_ERROR, STALLED_SHARE, MOST_DOUBLINGS = 0.01, 0.9, 8
 """Solver error of a converged setting, the share of it that two doublings of substeps or iterations leave where more
 are hopeless, and how many are tried."""
 
@@ -93,11 +93,11 @@ class LoadBand(Tabled):
     @property
     def error(self) -> float:
         """Error at the third size [1]: that of the scene, or one that moves the reference as far."""
-        return self.errors[SIZES.index(1.0)]
+        return self.errors[LOAD_SHARES.index(1.0)]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "load", self.load
-        for share, error in zip(SIZES, self.errors):
+        for share, error in zip(LOAD_SHARES, self.errors):
             yield f"x {share:g}", error_text(error) if error == error else "no rest"
         yield "converged", error_text(self.definition_error) if self.definition_error == self.definition_error else ""
         yield "reason", self.message
@@ -142,7 +142,7 @@ class NeededSetting(Tabled):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "more", self.raised
-        yield "setting", str(self.setting) if self.found else f"none up to {self.setting}"
+        yield "setting", str(self.setting) if self.found else f"not reached with {self.setting}"
         yield "solver error", error_text(self.solver_error) if self.solver_error == self.solver_error else "diverges"
         yield "a frame", number_text(self.frame_seconds, "s")
 
@@ -254,7 +254,7 @@ class EngineFit(Tabled):
         yield "drift across", error_text(self.result.drift)
         yield "without a factor", error_text(self.untuned.error)
         yield "run", f"{self.result.status} after {self.result.frames} frames"
-        yield "damping", f"{self.result.damping:.4g} 1/s, {DAMPED}"
+        yield "damping", f"{self.result.damping:.4g} 1/s, {DAMPING_NOTE}"
         yield "set besides", ENGINES[self.result.engine].besides
         yield "a frame", f"{1e3 * self.result.frame_seconds:.3g} ms"
         yield "note", self.message
@@ -272,7 +272,7 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
 
     def under(self, scene: Scene, factor: float, setting: Setting, order: int = 0) -> EngineResult:
         """Run of a scene of the same springs, damped critically for the loaded mode of the material."""
-        damping, rest = 2 * scene.motion().loaded_frequency, RESTING[setting.precision]
+        damping, rest = 2 * scene.motion().loaded_frequency, RUN_TOLERANCES[setting.precision]
         about: dict[str, Any] = {"frames": self.frames, "tolerance": rest, "damping": damping, "order": order}
         return in_engine(scene, self.engine, setting, factor=factor, **about)
 
@@ -285,7 +285,7 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         """Least and largest error over these orders, and why no factor is right where they are too far apart."""
         errors = np.array([one.error for one in self.orders(factor, setting)])
         low, high = float(errors.min()), float(errors.max())
-        if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= WITHIN:
+        if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= MOST_SPREAD:
             return (low, high), ""
         between = f"is {error_text(low)} to {error_text(high)}" if low == low else "has no end in some"
         return (low, high), (
@@ -368,7 +368,7 @@ def fit_engine(
     nan 8.61 mm in place of 1.00
     """
     chosen = ENGINES[engine]
-    setting = complete(chosen, setting or Setting(**parts))
+    setting = with_precision(chosen, setting or Setting(**parts))
     chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
     runs = _Runs(scene, engine, frames)
@@ -377,13 +377,13 @@ def fit_engine(
         raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
     spread, why = runs.spread(1.0, setting)
     factor, why = (np.nan, why) if why else _factor(runs, setting)
-    tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=_distance)
+    tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=_error_size)
     if factor == factor:
         spread, why = runs.spread(factor, setting)
         factor, tuned = (np.nan, untuned) if why else (factor, tuned)
     found = factor == factor
-    why = why or ("" if _rests(tuned) else tuned.message)
-    if abs(tuned.drift) > DRIFT:
+    why = why or ("" if _is_at_rest(tuned) else tuned.message)
+    if abs(tuned.drift) > MOST_DRIFT:
         why = "; ".join(filter(None, (why, tuned.drifts)))
     numbers = chosen.numbers(net_of(scene, factor), setting) if found else {}
     raised = ("substeps", "iterations") if chosen.iterates else ("substeps",)
@@ -410,12 +410,12 @@ def _typed_rows(engine: Engine, typed: Mapping[str, Any]) -> Iterator[tuple[str,
             yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
 
 
-def _rests(one: EngineResult) -> bool:
+def _is_at_rest(one: EngineResult) -> bool:
     """Whether a run rests, or does but for its rounding."""
-    return one.status == "rest" or one.status != "inverted" and one.swing <= SHAKE * abs(one.displacement)
+    return one.status == "rest" or one.status != "inverted" and one.swing <= MOST_SWING * abs(one.displacement)
 
 
-def _distance(one: EngineResult) -> float:
+def _error_size(one: EngineResult) -> float:
     return abs(one.error) if np.isfinite(one.error) else np.inf
 
 
@@ -435,7 +435,7 @@ def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
 
     def error(softness: float) -> float:
         off = runs.ratio(1 / softness, setting) - 1
-        return 0.0 if abs(off) <= TUNED else float(np.nan_to_num(off, nan=1.0))
+        return 0.0 if abs(off) <= FACTOR_ERROR else float(np.nan_to_num(off, nan=1.0))
 
     moved = f"{number_text(runs[1.0, setting].reference, 'm')} by finite elements"
     if not np.isfinite(runs.ratio(1.0, setting)):
@@ -447,8 +447,8 @@ def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
         why += "; take more substeps or iterations"
         return np.nan, f"no {what} reaches {moved}: {first:.3g} times the stiffness leaves {there} at {setting}{why}"
     brentq(error, *sorted((1 / first, 1 / last)), xtol=1e-5 / max(first, last), maxiter=60)
-    factor, best = min(((factor, one) for (factor, _), one in runs.items()), key=lambda pair: _distance(pair[1]))
-    if not abs(best.error) <= ALLOWED:
+    factor, best = min(((factor, one) for (factor, _), one in runs.items()), key=lambda pair: _error_size(pair[1]))
+    if not abs(best.error) <= MOST_FACTOR_ERROR:
         return np.nan, f"the displacement jumps over {moved} at {factor:.4g} times the stiffness"
     return factor, ""
 
@@ -460,8 +460,8 @@ def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
     is retried nearer.
     """
     stiffen = runs.ratio(1.0, setting) > 1
-    first, diverged, step = 1.0, np.nan, BRACKET if stiffen else 1 / BRACKET
-    for _ in range(BRACKETS):
+    first, diverged, step = 1.0, np.nan, BRACKET_RATIO if stiffen else 1 / BRACKET_RATIO
+    for _ in range(MOST_BRACKETS):
         factor = first * step
         ratio = runs.ratio(factor, setting)
         if stiffen and not np.isfinite(ratio):
@@ -469,7 +469,7 @@ def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
         elif not np.isfinite(ratio) or (ratio > 1) != stiffen:
             return first, factor, diverged
         else:
-            still = abs(ratio - runs.ratio(first, setting)) < SATURATED * abs(ratio)
+            still = abs(ratio - runs.ratio(first, setting)) < SATURATED_CHANGE * abs(ratio)
             first = factor
             if stiffen and still and diverged != diverged:
                 break
@@ -483,11 +483,11 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
         more = replace(setting, **{raised: getattr(setting, raised) * 2**power})
         untuned = runs[1.0, more]
         errors.append(abs(untuned.solver_error))
-        if found := _rests(untuned) and errors[-1] <= CONVERGED:
+        if found := _is_at_rest(untuned) and errors[-1] <= CONVERGED_ERROR:
             untuned = max(runs.orders(1.0, more), key=lambda one: abs(np.nan_to_num(one.solver_error, nan=np.inf)))
             errors[-1] = abs(untuned.solver_error)
-            found = errors[-1] <= CONVERGED
-        if found or (power > 1 and errors[-1] > STALLED * errors[-3]):
+            found = errors[-1] <= CONVERGED_ERROR
+        if found or (power > 1 and errors[-1] > STALLED_SHARE * errors[-3]):
             break
     engine = ENGINES[runs.engine]
     rows = _typed_rows(engine, engine.numbers(net_of(runs.scene), more)) if found else ()
@@ -495,7 +495,7 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
     return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds, typed)
 
 
-def _loaded(scene: Scene, load: str, size: float) -> Scene:
+def _scene_under(scene: Scene, load: str, size: float) -> Scene:
     """Scene of the same springs under a load of a size."""
     make = partial(Scene, definition=scene.definition, stiffness=scene.uniform_stiffness, sheet=scene.sheet)
     if scene.definition.needs == "cases" and load != scene.load:
@@ -507,23 +507,23 @@ def _loaded(scene: Scene, load: str, size: float) -> Scene:
 
 def _band(runs: _Runs, load: str, tuned: EngineResult) -> LoadBand:
     """Errors of the engine with the factor under a load of several sizes."""
-    scene, nothing = runs.scene, (np.nan,) * len(SIZES)
+    scene, nothing = runs.scene, (np.nan,) * len(LOAD_SHARES)
     base = scene.boundary_problem.size
     try:
         if load != scene.load and not isinstance(scene.boundary_problem, ShapeProblem):
             moved = unit_reference(scene.beam, scene.material, LOADS[load].kind, 1.0).displacement
             base = abs(tuned.reference / moved)
-        sizes = tuple(float(share * base) for share in SIZES)
-        found = [runs.under(_loaded(scene, load, size), tuned.factor, tuned.setting) for size in sizes]
+        sizes = tuple(float(share * base) for share in LOAD_SHARES)
+        found = [runs.under(_scene_under(scene, load, size), tuned.factor, tuned.setting) for size in sizes]
     except (ValueError, ReferenceNotConvergedError) as error:
         return LoadBand(load, nothing, nothing, np.nan, str(error))
-    errors = tuple(one.error if _rests(one) else np.nan for one in found)
-    why = next((one.message for one in found if not _rests(one)), "")
-    why = why or next((one.drifts for one in found if abs(one.drift) > DRIFT), "")
-    return LoadBand(load, sizes, errors, found[SIZES.index(1.0)].definition_error, why)
+    errors = tuple(one.error if _is_at_rest(one) else np.nan for one in found)
+    why = next((one.message for one in found if not _is_at_rest(one)), "")
+    why = why or next((one.drifts for one in found if abs(one.drift) > MOST_DRIFT), "")
+    return LoadBand(load, sizes, errors, found[LOAD_SHARES.index(1.0)].definition_error, why)
 
 
-def runnable(
+def best_runnable_scene(
     make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool
 ) -> tuple[Scene | None, str, tuple[str, ...]]:
     """Scene of the best definition that an engine runs, or None and why there is none; and what was tried."""
@@ -538,7 +538,7 @@ def runnable(
         name = able[0].definition
         scene = make(definition=name)
         try:
-            if abs(aside := drift(scene, scene.solve().displacements)) > DRIFT:
+            if abs(aside := drift(scene, scene.solve().displacements)) > MOST_DRIFT:
                 raise EngineError(
                     f"definition '{name}' moves across by {error_text(aside)}; take a finer mesh, or another type such "
                     "as 'structured'"

@@ -18,7 +18,7 @@ from ..mechanics.dynamics import Motion
 from ..mechanics.integrators import BackwardEuler
 from ..mechanics.stepping import make_stepper
 from .base import Setting, engine
-from .textbook import as_they_are
+from .textbook import energy_parameters
 
 TOLERANCE = 1e-5
 """Relative residual that ends conjugate gradients: SOFA's default."""
@@ -28,7 +28,7 @@ TOLERANCE = 1e-5
     "implicit-cg",
     order=50,
     laws=tuple(FORMULAS),
-    parameters=as_they_are(*FORMULAS),
+    parameters=energy_parameters(*FORMULAS),
     measured="1e-6, twenty scenes",
     source="Baraff 1998",
 )

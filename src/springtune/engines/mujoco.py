@@ -20,13 +20,13 @@ import numpy as np
 from ..handover.mujoco import elasticity, model
 from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
-from .base import SPRING, EngineError, Parameter, Session, Setting, engine, release
+from .base import SPRING_STIFFNESS, EngineError, Parameter, Session, Setting, engine, version_numbers
 
 FLEX_SINCE = 4
 """Version of MuJoCo from which on a flex has the law of plane stress."""
 
 TYPED = {
-    "stiffness": SPRING,
+    "stiffness": SPRING_STIFFNESS,
     "young": Parameter("Pa", "E"),
     "poisson": Parameter("1", "nu"),
     "thickness": Parameter("m", "h"),
@@ -61,7 +61,7 @@ class _Session:
     def __init__(self, net: SpringNet, setting: Setting, damping: float, integrator: str) -> None:
         import mujoco
 
-        if net.energies and release(mujoco.__version__)[0] < FLEX_SINCE:
+        if net.energies and version_numbers(mujoco.__version__)[0] < FLEX_SINCE:
             raise EngineError(f"MuJoCo {mujoco.__version__}: a flex needs MuJoCo {FLEX_SINCE}; install it")
         assert net.masses is not None  # of a scene that moves
         loaded = float(np.any(net.forces))

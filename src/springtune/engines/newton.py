@@ -34,9 +34,9 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.newton import colours, membrane, membrane_energies
-from .base import SPRING, EngineError, Parameter, Session, Setting, engine
+from .base import SPRING_STIFFNESS, EngineError, Parameter, Session, Setting, engine
 
-FASTEST = 1e30
+LARGEST_VELOCITY = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
 
 TRIANGLES = {
@@ -127,13 +127,13 @@ def _model(net: SpringNet) -> Any:
         builder.set_coloring(colours(net))
     else:
         builder.color()
-    builder.particle_max_velocity = FASTEST
+    builder.particle_max_velocity = LARGEST_VELOCITY
     model = builder.finalize(device="cpu")
     model.particle_grid = None
     return model
 
 
-BESIDES = (
+SCRIPT_SETTINGS = (
     "tri_kd=0, tri_drag=0, tri_lift=0 and kd=0 (tri_kd is 10 by default); edge_ke=0; radius=0 of particles (0.1 m by "
     "default) and model.particle_grid=None; gravity 0; masses density times thickness times a third of the triangles' "
     "areas; points about the origin"
@@ -156,9 +156,9 @@ NEWTON_COMMON: dict[str, Any] = {
     order=150,
     laws=("biquadratic",),
     law=membrane_energies,
-    parameters={"ke": SPRING} | TRIANGLES,
+    parameters={"ke": SPRING_STIFFNESS} | TRIANGLES,
     besides="builder.color() before finalize(), of springs builder.set_coloring(groups that no spring joins); "
-    + BESIDES,
+    + SCRIPT_SETTINGS,
     measured="1e-3, ten scenes, by the law that it has",
     **NEWTON_COMMON,
 )
@@ -170,8 +170,8 @@ def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
 @engine(
     "newton-xpbd",
     order=151,
-    parameters={"ke": SPRING},
-    besides=BESIDES,
+    parameters={"ke": SPRING_STIFFNESS},
+    besides=SCRIPT_SETTINGS,
     measured="1e-3, nine of ten scenes; 8e-3 near buckling, by rounding: the same steps in double are 5e-4 off",
     **NEWTON_COMMON,
 )

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from .base import Parameter, Setting, engine
-from .textbook import Textbook, project_springs, pulling
+from .textbook import Textbook, project_springs, refuse_pushing_springs
 
 
 def shares(net: SpringNet, setting: Setting) -> np.ndarray:
@@ -48,7 +48,7 @@ class PositionBased(Textbook):
     """Position-based dynamics: shares of stretches, which mean another stiffness at each setting; a warning."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
-        pulling(net, "no share of a stretch is negative")
+        refuse_pushing_springs(net, "no share of a stretch is negative")
         super().__init__(net, setting, damping)
         self.shares = shares(net, setting)[net.stiffness != 0].astype(self.kind)
 

@@ -16,7 +16,7 @@ from ..handover.net import SpringNet
 from ..linalg.factors import SUPERLU
 from ..linalg.kernels import compiled
 from .base import Setting, engine
-from .textbook import Textbook, pulling, spring_between, stretch_spring
+from .textbook import Textbook, refuse_pushing_springs, spring_between, stretch_spring
 
 
 @compiled
@@ -36,7 +36,7 @@ class Projective(Textbook):
     """Projective dynamics: local directions of springs, and a global linear system that is factorized once."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
-        pulling(net, "the global step needs a positive one")
+        refuse_pushing_springs(net, "the global step needs a positive one")
         super().__init__(net, setting, damping)
         self.free = (~net.held).astype(self.kind)
         self.descent = np.empty_like(self.x, order="F")  # as the factors take it

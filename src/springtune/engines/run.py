@@ -18,42 +18,41 @@ from ..safe_io.tables import Tabled, number_text
 from ..scene.single import Result, Scene
 from .base import ENGINES, Engine, EngineError, Session, Setting, count, number
 
-DRIFT = 0.05
+MOST_DRIFT = 0.05
 """Error across what is measured, over it, above which it is said, and springs are not recommended."""
 
-MOST_WORK = 1_000_000_000
+MOST_ITERATIONS = 1_000_000_000
 """Most frames times substeps times iterations of a run."""
 
 MOST_FRAMES = 600
 """Frames after which a run ends that has not come to rest; more where the scene's period is long."""
 
-PERIODS = 30
+LEAST_PERIODS = 30
 """Periods of the loaded mode that a run has at least."""
 
-WINDOW = 0.5
+WINDOW_PERIODS = 0.5
 """Time between two looks at a run, over the period of the loaded mode; at least a frame."""
 
-REST = {"float64": 1e-7, "float32": 1e-4}
+REST_TOLERANCES = {"float64": 1e-7, "float32": 1e-4}
 """Distance from rest, over the largest displacement, that a run stops at, by precision."""
 
-BLOWN = 1e2
+DIVERGED_EXTENTS = 1e2
 """Displacement over the body's extent beyond which a run has diverged."""
 
-RECALLED = 16
+SWING_WINDOWS = 16
 """Windows of a run that tell whether it swings."""
 
-LOOKS = 8
+LOOKS_PER_WINDOW = 8
 """Looks at a window at most, since a swing may repeat itself in each."""
 
-STEADY = 0.8
+STEADY_SWING_RATIO = 0.8
 """Amplitude of the later half of these over that of the earlier one, above which a swing is not on its way to rest."""
 
-CALM = 4
+REST_WINDOWS = 4
 """Windows in a row that a run has to be near rest."""
 
-SLOWEST = 0.99
-"""Largest ratio of changes that a run is judged by: a creep by less than 1 - `SLOWEST` of the tolerance in a window is
-taken for rest, since it might as well be rounding."""
+MOST_CHANGE_RATIO = 0.99
+"""Largest ratio of changes from one window to the next: slower creep counts as rest, since it may be rounding."""
 
 
 @dataclass(frozen=True)
@@ -229,9 +228,10 @@ def in_engine(
     factor : float, optional
         On all stiffnesses and moduli that are typed [1].
     frames : int, optional
-        At most; by default `MOST_FRAMES`, or `PERIODS` of the loaded mode.
+        At most; by default 600, or 30 periods of the loaded mode if that is more.
     tolerance : float, optional
-        Distance from rest over the largest displacement that ends the run [1]; by default `REST` of the precision.
+        Distance from rest over the largest displacement that ends the run [1]; by default 1e-7, in single precision
+        1e-4.
     damping : float, optional
         Over mass [1/s]; by default the critical one of the loaded mode.
     order : int, optional
@@ -267,7 +267,7 @@ def in_engine(
     16.5 mm in place of 1.0
     """
     chosen = ENGINES[engine]
-    setting = complete(chosen, setting or Setting(**parts))
+    setting = with_precision(chosen, setting or Setting(**parts))
     net, places = net_of(scene, number(factor, "factor")), np.arange(len(scene.mesh.points))
     if order:
         net, places = reordered(net, order)
@@ -275,14 +275,19 @@ def in_engine(
     frequency = scene.motion().loaded_frequency * factor**0.5
     damping = 2 * frequency if damping is None else damping
     session = chosen.start(net, setting, damping)
-    window = max(1, round(WINDOW * 2 * np.pi / frequency / setting.dt))
-    asked = max(MOST_FRAMES, ceil(PERIODS / WINDOW) * window) if frames is None else count(frames, "frames", MOST_WORK)
-    if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_WORK:
+    window = max(1, round(WINDOW_PERIODS * 2 * np.pi / frequency / setting.dt))
+    asked = (
+        max(MOST_FRAMES, ceil(LEAST_PERIODS / WINDOW_PERIODS) * window)
+        if frames is None
+        else count(frames, "frames", MOST_ITERATIONS)
+    )
+    if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_ITERATIONS:
         raise EngineError(
-            f"dt: {asked} frames of {setting} are over {MOST_WORK:.0e} iterations; take a longer dt, or fewer substeps"
+            f"dt: {asked} frames of {setting} are over {MOST_ITERATIONS:.0e} iterations; take a longer dt, or fewer "
+            "substeps"
         )
     extent = float(np.ptp(net.points, axis=0).max())
-    rest = REST[setting.precision] if tolerance is None else number(tolerance, "tolerance")
+    rest = REST_TOLERANCES[setting.precision] if tolerance is None else number(tolerance, "tolerance")
     ended = follow(session, window, asked, rest, extent)
     ended = replace(ended, displacements=ended.displacements[places])
     if ended.status == "rest" and scene.network.inverted(ended.displacements):
@@ -291,7 +296,7 @@ def in_engine(
     return EngineResult(**vars(ended), scene=scene, engine=engine, setting=setting, factor=factor, damping=damping)
 
 
-def complete(engine: Engine, setting: Setting) -> Setting:
+def with_precision(engine: Engine, setting: Setting) -> Setting:
     """Return a setting with the engine's own precision where it has none."""
     return setting if setting.precision else replace(setting, precision=engine.precisions[0])
 
@@ -348,14 +353,14 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
 
     Where the changes in windows of frames shrink by a ratio r, the rest of the way is the last change times r / (1 -
     r). A rising r tells of a slower motion below, so r is taken as if it rose on. A run rests where the rest of the way
-    stays below `tolerance` of the displacement in `CALM` windows, or where it trembles by less, as rounding does.
+    stays below `tolerance` of the displacement in `REST_WINDOWS` windows, or oscillates by less.
     """
     seen: list[np.ndarray] = []
     seconds: list[float] = []
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
         looks, size_of_window = [], min(window, most - done)
-        each = ceil(size_of_window / LOOKS)
+        each = ceil(size_of_window / LOOKS_PER_WINDOW)
         for begun in range(0, size_of_window, each):
             count = min(each, size_of_window - begun)
             begin = time.perf_counter()
@@ -364,28 +369,31 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
             done += count
             now = session.displacements()
             size = float(np.abs(now).max())
-            if not size <= BLOWN * extent:
+            if not size <= DIVERGED_EXTENTS * extent:
                 said = f"diverged within {done} frames; take more substeps, or a smaller stiffness"
-                return Ended(np.full(now.shape, np.nan), "diverged", said, done, _frame(seconds), np.nan)
+                return Ended(np.full(now.shape, np.nan), "diverged", said, done, _frame_seconds(seconds), np.nan)
             looks.append(now)
-        seen = [*seen[1 - RECALLED :], np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)])]
+        seen = [
+            *seen[1 - SWING_WINDOWS :],
+            np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)]),
+        ]
         aside = float(np.abs(now - np.array(looks)).max())
         change, wider = float(np.abs(now - last).max()), gap
         ratio = change / before if before else float(change > 0)
-        gap = 1 - min(ratio, SLOWEST)
-        ahead = max(1 - SLOWEST, min(gap, gap * gap / wider))
+        gap = 1 - min(ratio, MOST_CHANGE_RATIO)
+        ahead = max(1 - MOST_CHANGE_RATIO, min(gap, gap * gap / wider))
         left = max(change, aside) * max(1.0, (1 - ahead) / ahead)
         calm = calm + 1 if left <= tolerance * size else 0
         last, before = now, change
-        trembles = len(seen) == RECALLED and _swing(seen) <= tolerance * size and _trembles(seen)
-        if calm == CALM or trembles:
-            return Ended(now, "rest", "", done, _frame(seconds), 0.0)
+        trembles = len(seen) == SWING_WINDOWS and _swing(seen) <= tolerance * size and _oscillates(seen)
+        if calm == REST_WINDOWS or trembles:
+            return Ended(now, "rest", "", done, _frame_seconds(seconds), 0.0)
     swing = _swing(seen[len(seen) // 2 :])
-    if len(seen) > 1 and _trembles(seen) and swing > STEADY * _swing(seen[: len(seen) // 2]):
+    if len(seen) > 1 and _oscillates(seen) and swing > STEADY_SWING_RATIO * _swing(seen[: len(seen) // 2]):
         said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
-        return Ended(_mean(seen), "swings", said, done, _frame(seconds), swing)
+        return Ended(_mean(seen), "swings", said, done, _frame_seconds(seconds), swing)
     said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
-    return Ended(now, "moving", said, done, _frame(seconds), swing)
+    return Ended(now, "moving", said, done, _frame_seconds(seconds), swing)
 
 
 def _mean(seen: list[np.ndarray]) -> np.ndarray:
@@ -400,13 +408,13 @@ def _swing(seen: list[np.ndarray]) -> float:
     return float((high - low).max() / 2)
 
 
-def _trembles(seen: list[np.ndarray]) -> bool:
+def _oscillates(seen: list[np.ndarray]) -> bool:
     """Whether displacements go to and fro about one place rather than somewhere."""
     middle = len(seen) // 2
     drift = float(np.abs(_mean(seen[middle:]) - _mean(seen[:middle])).max())
     return _swing(seen[middle:]) > 2 * drift
 
 
-def _frame(seconds: list[float]) -> float:
+def _frame_seconds(seconds: list[float]) -> float:
     """Seconds a frame: the median, without the first look, which may compile."""
     return float(np.median(seconds[1:] or seconds))

@@ -8,10 +8,10 @@ solver that begins at y and stops early ends between y and the minimum. So it re
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.simulation import WORDS
+from ..handover.simulation import ENERGY_WORDS
 from ..handover.terms import VALUES
 from ..linalg.kernels import compiled
-from .base import SPRING, EngineError, Parameter, Setting
+from .base import SPRING_STIFFNESS, EngineError, Parameter, Setting
 
 
 @compiled
@@ -87,7 +87,7 @@ class Textbook:
         return (self.x - self.points).astype(float)
 
 
-def pulling(net: SpringNet, why: str) -> None:
+def refuse_pushing_springs(net: SpringNet, why: str) -> None:
     """Refuse springs of negative stiffness."""
     if np.any(net.stiffness < 0):
         raise EngineError(
@@ -96,10 +96,10 @@ def pulling(net: SpringNet, why: str) -> None:
         )
 
 
-def as_they_are(*kinds: str) -> dict[str, Parameter]:
+def energy_parameters(*kinds: str) -> dict[str, Parameter]:
     """Parameters of a solver that takes stiffnesses and values of kinds of energies as a net has them."""
-    return {"stiffness": SPRING} | {
-        f"{kind} {name}": Parameter(unit, f"{name} of {WORDS[kind]}, as of the net")
+    return {"stiffness": SPRING_STIFFNESS} | {
+        f"{kind} {name}": Parameter(unit, f"{name} of {ENERGY_WORDS[kind]}, as of the net")
         for kind in kinds
         for name, unit in VALUES[kind].items()
     }

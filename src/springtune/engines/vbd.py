@@ -21,7 +21,7 @@ from ..handover.net import SpringNet
 from ..linalg.kernels import compiled
 from ..mesh.cells import no_cells
 from .base import Setting, engine
-from .textbook import Textbook, as_they_are, pulling
+from .textbook import Textbook, energy_parameters, refuse_pushing_springs
 
 
 @compiled
@@ -112,7 +112,7 @@ class _Descent(Textbook):
     """Whether a step begins at the adaptive guess, or at the inertial position."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
-        pulling(net, "blocks need positive ones")
+        refuse_pushing_springs(net, "blocks need positive ones")
         super().__init__(net, setting, damping)
         self.last = self.v
         self.sizes = np.maximum((self.push**2).sum(axis=1, keepdims=True), np.finfo(self.kind).tiny) / self.h
@@ -147,21 +147,21 @@ class _Descent(Textbook):
 VERTEX_LAWS = ("area", "biquadratic")
 """Energies besides springs."""
 
-IN_COMMON: dict[str, Any] = {
+COMMON_ATTRIBUTES: dict[str, Any] = {
     "laws": VERTEX_LAWS,
-    "parameters": as_they_are(*VERTEX_LAWS),
+    "parameters": energy_parameters(*VERTEX_LAWS),
     "measured": "1e-6, twenty scenes",
     "source": "Chen 2024",
 }
 
 
-@engine("vbd", order=40, **IN_COMMON)
+@engine("vbd", order=40, **COMMON_ATTRIBUTES)
 class Adaptive(_Descent):
     """Vertex block descent from its paper's adaptive guess: at rest exact with any number of iterations."""
 
     adaptive = True
 
 
-@engine("vbd-inertia", order=41, **IN_COMMON)
+@engine("vbd-inertia", order=41, **COMMON_ATTRIBUTES)
 class Inertial(_Descent):
     """Vertex block descent from the inertial position."""

@@ -22,7 +22,7 @@ from .textbook import Textbook, project_springs
 BLOCK_KINDS = tuple(COMPLIANCE_UNITS)
 """Kinds of blocks, by their numbers here."""
 
-FLATTEST = 0.05
+LEAST_AREA_RATIO = 0.05
 """Area over the one at rest below which a triangle of rubber is taken for one that has it: steps may turn it over."""
 
 
@@ -90,7 +90,7 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
                 by[c, before, 0], by[c, before, 1] = 2 * dx, 2 * dy
                 by[c, after, 0], by[c, after, 1] = -2 * dx, -2 * dy
         else:
-            ratio = max(area / rest[e, 0], FLATTEST)
+            ratio = max(area / rest[e, 0], LEAST_AREA_RATIO)
             _rubber(here, slopes[e], ratio, growth / rest[e, 0], law[e], kind == 3, value, by)
         for a in range(size):
             for b in range(size):

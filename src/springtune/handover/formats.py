@@ -20,7 +20,7 @@ from .net import NOT_COMPUTED, SpringNet
 from .newton import newton_script
 from .paraview import write_vtu
 from .sofa import sofa_python
-from .terms import OF_CORNERS, VALUES, Net, Terms
+from .terms import CORNER_VALUES, VALUES, Net, Terms
 from .xpbd import xpbd
 
 
@@ -62,8 +62,8 @@ def write(path: str | Path, net: Net) -> list[Path]:
         return NET_FORMATS[ending](path, net)
     program, text = SIMULATORS[ending]
     calibrated = net.header.get("calibrated")
-    if calibrated and ending != AT_SETTING.get(calibrated["engine"]):
-        kept = " or ".join(filter(None, [AT_SETTING.get(calibrated["engine"]), ".csv, .json or .vtu"]))
+    if calibrated and ending != SETTING_ENDINGS.get(calibrated["engine"]):
+        kept = " or ".join(filter(None, [SETTING_ENDINGS.get(calibrated["engine"]), ".csv, .json or .vtu"]))
         raise ValueError(
             f"{path}: runs {program} at a step of its own, and the stiffness is for {calibrated['engine']} at "
             f"{calibrated['setting']}; give a name ending in {kept}"
@@ -141,7 +141,7 @@ def _of_terms(corners: int) -> Heads:
     """Heads of all values of terms, one for each corner where corners have their own."""
     ends = {False: [""], True: [f"_{corner}" for corner in "abcd"[:corners]]}
     return {
-        f"{kind}_{name}": [f"{kind}_{name}{end} [{unit}]" for end in ends[name in OF_CORNERS]]
+        f"{kind}_{name}": [f"{kind}_{name}{end} [{unit}]" for end in ends[name in CORNER_VALUES]]
         for kind, units in VALUES.items()
         for name, unit in units.items()
     }
@@ -274,7 +274,7 @@ SIMULATORS: dict[str, tuple[str, Callable[[Net], str]]] = {
 }
 """Programs, and the text of a net for them, by the ending of the name of its file."""
 
-AT_SETTING = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
+SETTING_ENDINGS = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
 """Endings of files that run a calibrated stiffness at the setting that it is for, by engine."""
 
 

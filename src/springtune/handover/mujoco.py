@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..safe_io.escapes import printable
-from .simulation import Simulation, about, filled, lame, load_in_words, numbers, simulate
+from .simulation import Simulation, comment_lines, fill_template, lame, load_in_words, numbers, simulate
 from .terms import Net, Terms
 
 LEAST_MASS = 1e-15
@@ -56,10 +56,10 @@ def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
     joints = [f"{axis}{number}" for number, axes in enumerate(free) for axis in axes]
     shares = net.forces[~net.held] / (simulation.force or 1.0)
     masses, dampers = simulation.masses, simulation.mass_damping * simulation.masses
-    return filled(
+    return fill_template(
         "mujoco.xml",
         title=printable(title),
-        about=[*about(net, simulation, said), f"Written {for_versions(net.energies)}."],
+        about=[*comment_lines(net, simulation, said), f"Written {for_versions(net.energies)}."],
         simulation=simulation,
         integrator=integrator,
         fast=accelerations.max() > LARGEST_ACCELERATION,

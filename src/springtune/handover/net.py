@@ -33,7 +33,7 @@ from ..problem.quantities import positive
 from ..registry import hook
 from ..safe_io.tables import Tabled
 from ..scene.boundary_problem import BeamProblem, ShapeProblem
-from ..scene.mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, named
+from ..scene.mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, naming_errors
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
 from ..scene.single import Scene
@@ -66,7 +66,7 @@ def meaning() -> str:
     return f"{of}; {signs}; linear kinematics, small strain"
 
 
-CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "plane", "density")
+MATERIAL_CONSTANTS = ("name", "young_modulus", "poisson_ratio", "plane", "density")
 """Constants of a material in a header."""
 
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
@@ -179,9 +179,9 @@ class SpringNet(Tabled, Net):
         if errors and scale is not None:
             header |= {"expected_error": _errors_on_shape(scene, springs), "expected_error_means": MEANING_ON_SHAPES}
         elif errors:
-            from ..prediction.choices import CASES  # here, since finite elements take half a second to import
+            from ..prediction.choices import USUAL_LOADS  # here, since finite elements take half a second to import
 
-            loads = tuple(dict.fromkeys((*CASES, scene.load)))
+            loads = tuple(dict.fromkeys((*USUAL_LOADS, scene.load)))
             header["expected_error"] = _expected_errors(
                 scene.sheet, scene.definition, springs, scene.beam, scene.material, loads
             )
@@ -248,7 +248,7 @@ class SpringNet(Tabled, Net):
         if springs is None:
             check_stiffness(chosen, stiffness)
             given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
-            with named(chosen):
+            with naming_errors(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
         inertia = None if material.density is None else masses(mesh, material.density, sheet.thickness)
         parts = _parts(chosen, sheet, [material], springs, inertia, mesh_name)
@@ -258,9 +258,9 @@ class SpringNet(Tabled, Net):
         else:
             header["beam"] = _beam(beam)
             if errors:
-                from ..prediction.choices import CASES, check_loads
+                from ..prediction.choices import USUAL_LOADS, check_loads
 
-                said = check_loads(CASES if loads is None else loads)
+                said = check_loads(USUAL_LOADS if loads is None else loads)
                 header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
         return cls(**parts)
 
@@ -338,7 +338,7 @@ def _parts(
 ) -> dict[str, Any]:
     """Arrays and header of a net without a load."""
     mesh, (formula, source) = sheet.mesh, described(definition)
-    material, *others = ({name: getattr(one, name, None) for name in CONSTANTS_SAID} for one in materials)
+    material, *others = ({name: getattr(one, name, None) for name in MATERIAL_CONSTANTS} for one in materials)
     header = {
         "made_by": f"springtune {__version__}",
         "definition": definition.name,

@@ -12,28 +12,28 @@ and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`. At small st
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
-from .simulation import about, filled, lame, simulate
+from .simulation import comment_lines, fill_template, lame, simulate
 from .terms import Net
 
 LAWS = ("biquadratic",)
 """Energies that triangles of Newton stand for."""
 
-LAW = (
+LAW_COMMENTS = (
     "Triangles have Newton's law: mu/2 (tr C - 2 J) + (lambda + mu)/2 (J - 1)^2, mu = tri_ke, lambda = tri_ka.",
     "At small strain it is that of the definition; the displacement expected here is by Newton's law.",
 )
 """What comments say of that law."""
 
-ITERATIONS = 10
+EXPLICIT_STEP_ITERATIONS = 10
 """Iterations in which VBD converges in a step that is stable in explicit schemes."""
 
-SLOW, PATIENT = 300, (3.0, 60)
+SLOW_PERIOD_STEPS, LONG_STEP_AND_ITERATIONS = 300, (3.0, 60)
 """Loaded period over the largest explicit step above which a step is three times that one, with more iterations.
 
 In single precision, what is left of h^2 f / m below the last place of a position is lost in each step.
 """
 
-DECAYS = 12
+DECAY_TIMES = 12
 """Times in which the slowest mode comes down to 1/e that a script runs for."""
 
 
@@ -70,24 +70,24 @@ def newton_script(net: Net) -> str:
     simulation = simulate(net, "Newton", LAWS, membrane_energies)
     shear, first = membrane(net)
     largest, loaded, damping = simulation.largest_step, simulation.loaded_frequency, simulation.mass_damping
-    step, iterations = simulation.step, ITERATIONS
-    if loaded and 2 * np.pi / loaded > SLOW * largest:
-        step, iterations = PATIENT[0] * largest, PATIENT[1]
+    step, iterations = simulation.step, EXPLICIT_STEP_ITERATIONS
+    if loaded and 2 * np.pi / loaded > SLOW_PERIOD_STEPS * largest:
+        step, iterations = LONG_STEP_AND_ITERATIONS[0] * largest, LONG_STEP_AND_ITERATIONS[1]
     # Of the slowest mode that the load excites.
     rate = damping / 2 - max(damping**2 / 4 - simulation.frequency**2, 0.0) ** 0.5
     said = f"the one here is {step / largest:.2g} times that, in which {iterations} iterations converge"
-    seconds = DECAYS / rate if rate else 100 * simulation.step
+    seconds = DECAY_TIMES / rate if rate else 100 * simulation.step
     if calibrated := net.header.get("calibrated"):
         step, damping, seconds = (float(calibrated[one]) for one in ("step", "damping", "seconds"))
         iterations = int(calibrated["iterations"])
         said = f"the one here is that of {calibrated['setting']}, for which the stiffness is made"
-    return filled(
+    return fill_template(
         "newton.py",
         net=net,
         simulation=simulation,
         promised=float(calibrated["displacement"]) if calibrated else None,
         damping=damping,
-        about=[*about(net, simulation, said), *(LAW if net.energies else ())],
+        about=[*comment_lines(net, simulation, said), *(LAW_COMMENTS if net.energies else ())],
         tri_ke=shear,
         tri_ka=first,
         step=step,

@@ -19,11 +19,11 @@ from ..problem.status import Status
 from ..safe_io.escapes import printable, xml_comment
 from .terms import Net, Terms, energies_of
 
-STEP_SHARE = 0.8
+STABLE_STEP_SHARE = 0.8
 """Written step over the largest stable one, at rest, in equilibrium and as far as the net swings: fronts of waves
 stretch springs further."""
 
-WORDS = {
+ENERGY_WORDS = {
     "area": "areas",
     "angle": "angles",
     "corner": "angles",
@@ -34,7 +34,7 @@ WORDS = {
 """Words for energies besides springs, by kind."""
 
 
-PERIOD = 50
+STEPS_PER_PERIOD = 50
 """Implicit steps of the slowest period that the load excites."""
 
 
@@ -65,8 +65,8 @@ class Simulation:
 
     @property
     def implicit_step(self) -> float:
-        """Step of schemes that are stable in any: a share `PERIOD` of the slowest period that the load excites [s]."""
-        return float(2 * np.pi / self.loaded_frequency / PERIOD) if self.loaded_frequency else self.step
+        """Step of unconditionally stable schemes: the slowest period that the load excites over 50 [s]."""
+        return float(2 * np.pi / self.loaded_frequency / STEPS_PER_PERIOD) if self.loaded_frequency else self.step
 
 
 def simulate(
@@ -112,7 +112,7 @@ def simulate(
         tangents = (network.tangent(share * displacements) for share in (1.0, 1.0 + beyond))
         stiffest = max(map(motion.highest_frequency, tangents))
         stable = min(stable, 2 / stiffest)
-    step = STEP_SHARE * stable
+    step = STABLE_STEP_SHARE * stable
     return Simulation(net.masses, force, largest, step, lowest, loaded, damping, displacements, why)
 
 
@@ -154,7 +154,7 @@ def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
     """Refuse a net that a simulator cannot represent."""
     name = net.header["definition"]
-    lacking = next((WORDS[terms.kind] for terms in net.energies if terms.kind not in laws), "")
+    lacking = next((ENERGY_WORDS[terms.kind] for terms in net.energies if terms.kind not in laws), "")
     if lacking:
         raise ValueError(
             f"definition '{name}': has energies of {lacking}, and {program} has no such law; take one such as 'patch'"
@@ -208,7 +208,7 @@ def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
     return max(first, 0.0), float(twice) / 2
 
 
-def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
+def comment_lines(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     """Lines of comment: definition, material, load, expected errors and step; each is one line, whatever a name has."""
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
@@ -249,7 +249,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     return [printable(line) for line in lines]
 
 
-def filled(name: str, **values: Any) -> str:
+def fill_template(name: str, **values: Any) -> str:
     """Fill in a template; floats get the shortest text that is read back exactly."""
     return str(_templates().get_template(f"{name}.jinja").render(values))
 

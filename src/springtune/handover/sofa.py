@@ -9,7 +9,7 @@ has one stiffness for all edges, divides it by their lengths, and since v24.12 p
 
 import numpy as np
 
-from .simulation import PERIOD, about, filled, numbers, simulate
+from .simulation import STEPS_PER_PERIOD, comment_lines, fill_template, numbers, simulate
 from .terms import Net
 
 BACKWARD_EULER = (
@@ -63,15 +63,16 @@ def sofa_python(net: Net) -> str:
         sheet.append(_vec3("ConstantForceField", name="load", indices=numbers(loaded), **data))
     said = "the one here is below it"
     if simulation.loaded_frequency:
-        said = f"the one here is that of backward Euler, a {PERIOD}th of the slowest period that the load excites"
+        share = f"a {STEPS_PER_PERIOD}th of the slowest period that the load excites"
+        said = f"the one here is that of backward Euler, {share}"
     predicted = []
     if simulation.displacements is not None:
         shown = {"showObject": "1", "showObjectScale": "4", "showColor": "0.1 0.6 0.2 1"}
         moved = _positions(net.points + simulation.displacements)
         predicted = [_vec3("MechanicalObject", name="particles", position=moved, **shown)]
-    return filled(
+    return fill_template(
         "sofa.py",
-        about=about(net, simulation, said),
+        about=comment_lines(net, simulation, said),
         step=simulation.implicit_step,
         plugins=PLUGINS,
         backward_euler=BACKWARD_EULER,

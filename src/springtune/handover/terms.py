@@ -42,10 +42,10 @@ VALUES = {
 }
 """Names of the values of each kind of terms, and their units."""
 
-OF_CORNERS = ("rest_angle", "rotational", "rest_length", "tensile", "coupling", "rest_weight")
+CORNER_VALUES = ("rest_angle", "rotational", "rest_length", "tensile", "coupling", "rest_weight")
 """Values that each corner of a cell has its own of."""
 
-MADE_OF: dict[str, type[Energy]] = {
+ENERGY_CLASSES: dict[str, type[Energy]] = {
     "area": AreaEnergy,
     "angle": AngleEnergy,
     "corner": AngleEnergy,
@@ -61,7 +61,7 @@ def _rest_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(sides, axis=2))
 
 
-AT_REST: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+REST_VALUES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "rest_area": signed_areas,
     "rest_angle": corner_angles,
     "rest_length": _rest_lengths,
@@ -96,7 +96,7 @@ class Terms:
     @property
     def moduli(self) -> dict[str, np.ndarray]:
         """Values that the energy is proportional to."""
-        return {name: self.values[name] for name in VALUES[self.kind] if name not in AT_REST}
+        return {name: self.values[name] for name in VALUES[self.kind] if name not in REST_VALUES}
 
     @property
     def present(self) -> np.ndarray:
@@ -124,7 +124,7 @@ class Net:
 
 def terms_of(energy: Energy, mesh: Mesh, reference: float) -> Terms:
     """Energy of a network as plain arrays, for all cells with as many corners; moduli are over `reference` [N/m]."""
-    kind = next((kind for kind, made in MADE_OF.items() if isinstance(energy, made)), "")
+    kind = next((kind for kind, made in ENERGY_CLASSES.items() if isinstance(energy, made)), "")
     if not kind:
         raise DefinitionError(
             f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
@@ -137,10 +137,10 @@ def terms_of(energy: Energy, mesh: Mesh, reference: float) -> Terms:
     cells, values = mesh.cells[energy.corners.shape[1]], {}
     rows = rows_of(cells, energy.corners)
     for name in VALUES[kind]:
-        if name in AT_REST:
-            values[name] = AT_REST[name](mesh.points, cells)
+        if name in REST_VALUES:
+            values[name] = REST_VALUES[name](mesh.points, cells)
         else:
-            values[name] = np.zeros(cells.shape if name in OF_CORNERS else len(cells))
+            values[name] = np.zeros(cells.shape if name in CORNER_VALUES else len(cells))
             if given.get(name) is not None:
                 values[name][rows] = reference * given[name]
     return Terms(kind, cells, values)
@@ -153,5 +153,5 @@ def energies_of(net: Net, reference: float) -> list[Energy]:
         moduli = [one[terms.present] / reference for one in terms.moduli.values()]
         if terms.kind == "incompressible":
             moduli = [np.column_stack(moduli)]
-        found.append(MADE_OF[terms.kind](net.points, terms.cells[terms.present], *moduli))
+        found.append(ENERGY_CLASSES[terms.kind](net.points, terms.cells[terms.present], *moduli))
     return found

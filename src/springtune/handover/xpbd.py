@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.energies import area_slopes
-from .simulation import filled, simulate
+from .simulation import fill_template, simulate
 from .terms import VALUES, Net, Terms
 
 OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
@@ -31,7 +31,7 @@ OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
 COMPLIANCE_UNITS = {"area": "m3/N", "biquadratic": "m3/N", "incompressible": "1/(N m)", "compressible": "1/(N m)"}
 
 
-WELL_SHAPED = "take a mesh with less slender or obtuse cells"
+MESH_REMEDY = "take a mesh with less slender or obtuse cells"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def compliances(net: Net) -> dict[str, Any]:
     return found | {f"{one.kind} compliance": one.compliance for one in blocks(net)}
 
 
-def _check_positive(net: Net, values: np.ndarray, which: str, count: int, remedy: str = WELL_SHAPED) -> None:
+def _check_positive(net: Net, values: np.ndarray, which: str, count: int, remedy: str = MESH_REMEDY) -> None:
     negative = int((values < 0).sum())
     if negative:
         raise ValueError(
@@ -104,7 +104,7 @@ def xpbd(net: Net) -> str:
     """Return particles and constraints of a net for XPBD, as JSON."""
     simulation = simulate(net, "XPBD", COMPLIANCE_UNITS)
     there, whole = net.stiffness > 0, np.asarray(net.held.all(axis=1))
-    return filled(
+    return fill_template(
         "xpbd.json",
         dumps=json.dumps,
         header=dict(net.header) | {"springs_without_stiffness_left_out": int((~there).sum())},

@@ -27,31 +27,31 @@ from ..problem.status import Status
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
-from ..scene.mesh_cache import MeshCache, chosen
+from ..scene.mesh_cache import MeshCache, choose
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
-CASES = ("traction", "bending", "shear")
+USUAL_LOADS = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
 
 SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
 """Limits of a beam's sides [m] and aspect ratio: beyond them the unit is likely wrong, or bending has no reference."""
 
-KEPT = 4
+MOST_CHOICES = 4
 """Choices that are kept of all definitions, and of those of springs alone."""
 
-ALIKE = 1e-5
+EQUAL_STIFFNESS = 1e-5
 """Relative difference below which stiffnesses count as equal: five digits are shown."""
 
-EQUAL = 1e-11
+EQUAL_FORCES = 1e-11
 """Relative difference below which stiffness matrices count as equal, but for rounding."""
 
 SEARCHED_PARTICLES, SOLVED_PARTICLES = 20_000, 100_000
 """Particles up to which meshes are searched, in some six seconds each; up to which one is solved, in a minute."""
 
 
-ROUNDED = 1e-9
+ROUNDING_ERROR = 1e-9
 """Largest error by rounding [1]; references of closed form have a smaller estimate."""
 
 _T = TypeVar("_T")
@@ -187,7 +187,7 @@ def predicted() -> tuple[str, ...]:
 
 def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
     """Loads, each once."""
-    return check_names("loads", loads, predicted(), CASES, "cannot be predicted")
+    return check_names("loads", loads, predicted(), USUAL_LOADS, "cannot be predicted")
 
 
 def check_names(
@@ -205,7 +205,7 @@ def check_names(
     return tuple(dict.fromkeys(names))
 
 
-def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> References:
+def references(beam: Beam, material: Material, loads: Iterable[str] = USUAL_LOADS) -> References:
     """References of loads."""
     check_beam(beam)
     return {load: reference_of(beam, material, load) for load in check_loads(loads)}
@@ -226,7 +226,7 @@ def predict(
     material: AnyMaterial | Mapping[str, AnyMaterial],
     known: References | None = None,
     *,
-    loads: Iterable[str] = CASES,
+    loads: Iterable[str] = USUAL_LOADS,
     load: str | None = None,
     also: Iterable[str] = (),
 ) -> list[Choice]:
@@ -304,12 +304,12 @@ def trial(
     material: AnyMaterial | Mapping[str, AnyMaterial],
     known: References | None = None,
     *,
-    loads: Iterable[str] = CASES,
+    loads: Iterable[str] = USUAL_LOADS,
     load: str | None = None,
     also: Iterable[str] = (),
 ) -> "Trial":
     """Definitions to solve on a mesh, with the arguments of `predict`."""
-    more = [chosen(DEFINITIONS, name, "also").name for name in also]
+    more = [choose(DEFINITIONS, name, "also").name for name in also]
     if isinstance(beam, Shape):
         problem = ShapeProblem(beam, mesh, material, only_load(beam, load), 1.0, "linear")
         return Trial([problem], shape_references(problem) if known is None else known, also=more)
@@ -326,7 +326,7 @@ def beam_problems(
     beam: Beam,
     mesh: Mesh | GroupedMesh,
     material: AnyMaterial | Mapping[str, AnyMaterial],
-    loads: Iterable[str] = CASES,
+    loads: Iterable[str] = USUAL_LOADS,
 ) -> list[BeamProblem]:
     """Statements of 1 N in linear kinematics, one for each load."""
     is_a(mesh, Mesh, "mesh", A_MESH)
@@ -338,7 +338,7 @@ def beam_problems(
 
 def as_sure_as(known: Mapping[str, Any]) -> float:
     """Difference up to which errors against some references are equal [1]."""
-    return max([one.error_estimate for one in known.values() if not isinstance(one, str)] + [ROUNDED])
+    return max([one.error_estimate for one in known.values() if not isinstance(one, str)] + [ROUNDING_ERROR])
 
 
 def in_order(
@@ -402,7 +402,7 @@ def errors_under(problem: BoundaryProblem, springs: Springs, known: References) 
 def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], also: Collection[str] = ()) -> list[str]:
     """Best definitions of springs alone and of all, and those of `also` by (energies, worst error) of each."""
     order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), as_sure_as(known))
-    best = order[:KEPT] + [name for name in order if not found[name][0]][:KEPT]
+    best = order[:MOST_CHOICES] + [name for name in order if not found[name][0]][:MOST_CHOICES]
     return [name for name in order if name in best or name in also]
 
 
@@ -474,7 +474,7 @@ class Trial:
         motion = np.random.default_rng(0).standard_normal(self.mesh.points.shape)
         forces = springs.reference * self._sheet.network(first.loading.held, springs).linear_forces(motion)
         for other, known in self._forces.items():
-            if np.linalg.norm(forces - known) <= EQUAL * np.linalg.norm(known):
+            if np.linalg.norm(forces - known) <= EQUAL_FORCES * np.linalg.norm(known):
                 return other
         self._forces[name] = forces
         return name
@@ -562,12 +562,12 @@ def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
     mesh = sheet.mesh
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1
     inside, at_outline, diagonals = (
-        _common(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
+        _common_value(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
     )
     extra = []
     for energy in springs.energies:
         if isinstance(energy, AreaEnergy):
-            modulus = _common(springs.reference * energy.modulus) / sheet.thickness
+            modulus = _common_value(springs.reference * energy.modulus) / sheet.thickness
             extra.append(f"area energy, K_A = {1e-6 * modulus:.4g} MPa")
         else:
             extra.append(next(words for kind, words in IN_WORDS if isinstance(energy, kind)))
@@ -576,9 +576,9 @@ def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
     return inside, at_outline, "; ".join(extra) or "nothing"
 
 
-def _common(values: np.ndarray) -> float:
+def _common_value(values: np.ndarray) -> float:
     """The common value of all, NaN where they differ."""
-    alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
+    alike = len(values) and values.any() and np.ptp(values) <= EQUAL_STIFFNESS * np.abs(values).max()
     return float(np.median(values)) if alike else nan
 
 

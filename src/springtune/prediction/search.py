@@ -30,8 +30,8 @@ from ..safe_io.tables import Tabled, mesh_size_text
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
 from ..scene.meshes import A_MATERIAL, is_a
 from .choices import (
-    CASES,
     SEARCHED_PARTICLES,
+    USUAL_LOADS,
     Choice,
     References,
     Trial,
@@ -47,26 +47,26 @@ from .choices import (
     shape_references,
 )
 
-ENOUGH_FINER, FEWEST_FINER = 2.0, 2
+FINEST_CELLS_RATIO, LEAST_FINER_MESHES = 2.0, 2
 """Cells across the finest mesh tried over those of the answer, and number of finer meshes tried, at least."""
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of an equilateral triangle, over its side."""
 
-LEFT_TO_GO = 1.5
+EXTRAPOLATION_MARGIN = 1.5
 """Allowed rest of an error's way to its limit, over the rest of an error in proportion to the mesh size."""
 
 
-EVERY_UP_TO, STEPS_A_DOUBLING = 16, 4
+EVERY_CELL_COUNT_UP_TO, STEPS_A_DOUBLING = 16, 4
 """Cells across up to which every number of them is tried; steps by which they double beyond that."""
 
-FINER = tuple(0.5 ** (step / 24) for step in range(1, 24))
+FINER_SIZES = tuple(0.5 ** (step / 24) for step in range(1, 24))
 """Finer sizes that an answer is tried on, over its own: cells are stretched between whole divisions."""
 
-FEW_CELLS = 10
+ALL_FINER_BELOW_CELLS = 10
 """Cells across an answer from which on only every second of these sizes is tried: errors are less irregular."""
 
-FEWEST_CELLS = 4
+REGULAR_FROM_CELLS = 4
 """Cells across a mesh above which errors change regularly with the mesh size."""
 
 ACROSS_DECIMALS = 3
@@ -280,7 +280,7 @@ def find_mesh(
     material: AnyMaterial | Mapping[str, AnyMaterial],
     error: float | str,
     *,
-    loads: Iterable[str] = CASES,
+    loads: Iterable[str] = USUAL_LOADS,
     mesh_types: Sequence[str] | None = None,
     load: str | None = None,
     make: Callable[[float], GroupedMesh] | None = None,
@@ -346,7 +346,7 @@ def find_mesh(
     if not (isinstance(most, int) and most > 0):
         raise ValueError(f"most: {most!r} is no number of particles; give one such as {SEARCHED_PARTICLES}")
     if isinstance(beam, Shape):
-        if loads is not CASES or mesh_types is not None:
+        if loads is not USUAL_LOADS or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
         load = only_load(beam, load)
         families = [_shape_family(beam, material, load, make or partial(mesh_shape, beam))]
@@ -430,8 +430,8 @@ def _shape_family(
 
 def _cells(rung: int) -> int:
     """Cells across of the meshes that are tried first: 1, 2, 3, ..., 15, 16, 20, 23, 27, 32, 39, ..."""
-    beyond = rung + 1 - EVERY_UP_TO
-    return rung + 1 if beyond <= 0 else math.ceil(EVERY_UP_TO * 2 ** (beyond / STEPS_A_DOUBLING))
+    beyond = rung + 1 - EVERY_CELL_COUNT_UP_TO
+    return rung + 1 if beyond <= 0 else math.ceil(EVERY_CELL_COUNT_UP_TO * 2 ** (beyond / STEPS_A_DOUBLING))
 
 
 def tried_names(solved: Iterable[SolvedMesh], springs_alone: bool = False) -> list[str]:
@@ -478,7 +478,7 @@ class _Search:
         """As `_start`, with sizes between whole divisions tried."""
         while start := self._start(springs_alone):
             cells, names = start
-            for part in FINER[:: 1 if cells < FEW_CELLS else 2]:
+            for part in FINER_SIZES[:: 1 if cells < ALL_FINER_BELOW_CELLS else 2]:
                 one = round(self.family.one_cell / (self._size(cells) * part), ACROSS_DECIMALS)
                 self._solve(one, names, whole=False)
                 if self._start(springs_alone) != start:
@@ -495,7 +495,7 @@ class _Search:
             failing = max((one.cells for one in tried if not self._keeps(name, one)), default=0)
             kept = [int(one.cells) for one in self._on(name) if one.cells > failing]
             # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
-            enough = [cells for cells in kept[:-FEWEST_FINER] if ENOUGH_FINER * cells <= kept[-1]]
+            enough = [cells for cells in kept[:-LEAST_FINER_MESHES] if FINEST_CELLS_RATIO * cells <= kept[-1]]
             if enough and self._steady(name):
                 starts.setdefault(enough[0], []).append(name)
         return min(starts.items()) if starts else None  # no two have the same cells
@@ -566,9 +566,9 @@ class _Search:
         """
         on = self._on(name)
         doubling = self._doubling(name)
-        if doubling is None or ENOUGH_FINER * FEWEST_CELLS > on[-1].cells:
+        if doubling is None or FINEST_CELLS_RATIO * REGULAR_FROM_CELLS > on[-1].cells:
             return bool(on)
-        left = LEFT_TO_GO * (1 - on[-1].cells / self._finest)
+        left = EXTRAPOLATION_MARGIN * (1 - on[-1].cells / self._finest)
         before, last = doubling
         if any(before[load] != before[load] and last[load] != last[load] for load in last):
             return False
@@ -585,5 +585,5 @@ class _Search:
     def _doubling(self, name: str) -> tuple[dict[str, float], dict[str, float]] | None:
         """Errors on a mesh of half as many cells across as the finest one that was tried, or fewer, and on that."""
         on = self._on(name)
-        coarser = [one for one in on if ENOUGH_FINER * one.cells <= on[-1].cells]
+        coarser = [one for one in on if FINEST_CELLS_RATIO * one.cells <= on[-1].cells]
         return (coarser[-1].errors[name], on[-1].errors[name]) if coarser else None

@@ -118,8 +118,8 @@ def beyond_linear(rotation: float, strain: float) -> str:
     reasons = []
     # The first term of the series bounds the effect: most beams do without the elastica, and without importing it.
     if 4 / 35 * (2 * rotation) ** 2 > MOST_EFFECT and -(effect := rotation_effect(rotation)) > MOST_EFFECT:
-        reasons.append(f"it turns by {abs(rotation):.2g} rad, where finite rotation takes {-100 * effect:.2g} % off "
-                       "a cantilever's deflection")  # fmt: skip
+        reasons.append(f"it turns by {abs(rotation):.2g} rad, and a cantilever that turns so far deflects by "
+                       f"{-100 * effect:.2g} % less than in small strain")  # fmt: skip
     if abs(strain) > MOST_STRAIN:
         reasons.append(f"its strain is {100 * abs(strain):.2g} %")
     return f"the linear reference does not apply: {', and '.join(reasons)}" if reasons else ""

@@ -14,10 +14,10 @@ from ..problem.quantities import positive
 from ..safe_io.tables import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
-from .mesh_cache import chosen, named
+from .mesh_cache import choose, naming_errors
 from .meshes import A_MATERIAL, A_MESH, check_filled, is_a
 
-STARTS = ("van-gelder", "lattice", "energy-fit")
+START_DEFINITIONS = ("van-gelder", "lattice", "energy-fit")
 """Definitions from whose springs searches start."""
 
 
@@ -138,7 +138,7 @@ def best_springs(
     *,
     negative: bool = False,
     reach: float | str | None = None,
-    starts: Sequence[str] = STARTS,
+    starts: Sequence[str] = START_DEFINITIONS,
     evaluations: int = EVALUATIONS,
 ) -> BestSprings:
     """Search for the stiffness of each spring with the least error over a space of loads and the field inside.
@@ -192,13 +192,13 @@ def best_springs(
     if isinstance(evaluations, bool) or not (isinstance(evaluations, int) and evaluations > 0):
         raise ValueError(f"evaluations: {evaluations!r} is not a whole number above zero")
     if isinstance(starts, str) or not starts:
-        raise ValueError(f"starts: {starts!r} is no list of definitions; give some such as {list(STARTS)}")
+        raise ValueError(f"starts: {starts!r} is no list of definitions; give some such as {list(START_DEFINITIONS)}")
     begin, sought = time.perf_counter(), material.in_plane
     space = LoadSpace(mesh if reach is None else bonded(mesh, positive(reach, "length", "reach")), sought.poisson_ratio)
     scale, found = sought.young_modulus * thickness, {}
     for name in starts:
-        one = chosen(DEFINITIONS, name, "starts")
-        with named(one):
+        one = choose(DEFINITIONS, name, "starts")
+        with naming_errors(one):
             springs = one.springs(space.mesh, material, thickness)
         found[name] = space.search(springs.relative * springs.reference / scale, False, evaluations)
     if negative:

@@ -32,7 +32,7 @@ from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
-from .mesh_cache import Loading, MeshCache, Solution, chosen, solved
+from .mesh_cache import Loading, MeshCache, Solution, choose, solve_and_judge
 from .meshed import check_meshed
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
 
@@ -126,7 +126,7 @@ class BoundaryProblem(ABC):
     def solve(self, springs: Springs) -> Solution:
         """Equilibrium, judged; its displacement is the first quantity of interest."""
         problem, first = self.sheet.problem(self.loading, springs), self.case.quantities[0]
-        return solved(
+        return solve_and_judge(
             problem,
             self.factor(springs),
             self.kinematics,
@@ -205,7 +205,7 @@ class BeamProblem(BoundaryProblem):
         if beam not in self.sheet.filled:
             check_filled(mesh, beam)
             self.sheet.filled.add(beam)
-        about = load if isinstance(load, Load) else chosen(LOADS, load, "load")
+        about = load if isinstance(load, Load) else choose(LOADS, load, "load")
         if force is None:
             raise ValueError("force: none; give the size of the force on the beam such as '400 kN'")
         self.size = positive(force, "force", "force")
@@ -272,7 +272,7 @@ class ShapeProblem(BoundaryProblem):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
         self.scale, self.force = float(scale), 1.0
         self.size = abs(self.scale)
-        self.case = scaled(chosen(shape.loads, load, "load"), self.scale)
+        self.case = scaled(choose(shape.loads, load, "load"), self.scale)
         self.load, self.sheet = self.case.name, sheet_of(self.mesh, self.thickness, sheet)
         if not self.case.quantities:
             raise ValueError(f"load {load!r}: asks for nothing; give it quantities, the main one first")

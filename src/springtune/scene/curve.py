@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from .single import Scene
 
-RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
+USUAL_RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 """Stiffnesses of a curve over E t [1], where none are given."""
 
 
@@ -182,7 +182,9 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     if scene.follower:
         raise ValueError(f"load: {scene.load!r} turns with its side, and has no curve; take linear kinematics")
     try:
-        ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
+        ratios = np.sort(
+            np.asarray(USUAL_RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel()
+        )
     except (TypeError, ValueError, OverflowError):
         ratios = np.zeros(0)
     if not len(ratios) or not ((ratios > LEAST_RATIO) & (ratios < 1 / LEAST_RATIO)).all():

@@ -24,10 +24,10 @@ from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
 from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
-from .measured import Block, MeasuredTest, blocks, stated
-from .mesh_cache import chosen
+from .measured import Block, MeasuredTest, blocks, body_of_test
+from .mesh_cache import choose
 from .meshes import is_a
-from .residuals import FEWEST_POINTS, excess, measured
+from .residuals import FEWEST_POINTS, correlation_excess, find_measurements
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,59 +39,59 @@ SHEET_LAWS = {
 }
 """Laws, and the names of their constants; regions have a modulus each, too, such as ``E core``."""
 
-ASSUMED = {"nu": 0.3, "nu12": 0.3}
+USUAL_POISSON_RATIOS = {"nu": 0.3, "nu12": 0.3}
 """Poisson's ratios where a search begins, and which are assumed where tests do not tell."""
 
 REMEDIES = {"G12": "add a test in shear, or of a coupon cut at 45 degrees", "E2": "add a coupon cut across"}
-REMEDIES |= dict.fromkeys(ASSUMED, "add a transverse displacement or a field, or give it as known")
+REMEDIES |= dict.fromkeys(USUAL_POISSON_RATIOS, "add a transverse displacement or a field, or give it as known")
 """What to add where a constant is not determined; for others a force."""
 
-NULL = 1e-7
+LEAST_DERIVATIVE = 1e-7
 """Derivative by a constant besides those by others, over the largest, below which tests do not tell the constant."""
 
-RATIO = 0.1
+POISSON_STEP = 0.1
 """Change of a Poisson's ratio that is as likely as one of a modulus by a factor e."""
 
-POOR = 0.5
+POOR_HALF_INTERVAL = 0.5
 """Half of an interval from which on a constant is poorly determined: of a ratio, or relative."""
 
-CHANCE = 0.01
+MISFIT_PROBABILITY = 0.01
 """Probability of residuals by chance below which a law misfits."""
 
-EXPLAINED = 0.5
+EXPLAINED_SHARE = 0.5
 """Share of a field's squares below which, with residuals that are not random, it is not of its load."""
 
-MODEL = 3e-4
+REFERENCE_ERROR = 3e-4
 """Error of the reference over the values' root mean square, below which residuals tell nothing."""
 
 LEAST_NOISE = 1e-9
 """Noise over the values' root mean square that is rounding."""
 
 
-def varied(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:
+def vary(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:
     """Change constants by steps: ratios by addition, moduli by factors exp(step), others relatively."""
     changed = dict(constants)
     for name, step in zip(names, steps):
         value = constants[name]
-        added = step if name in ASSUMED else step * abs(value)
+        added = step if name in USUAL_POISSON_RATIOS else step * abs(value)
         changed[name] = value * np.exp(step) if name[0] in "EG" else value + added
     return changed
 
 
-def assumed(constants: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+def assume_usual(constants: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
     """Replace named constants by what is usual beside the others."""
-    found = constants | {name: ratio for name, ratio in ASSUMED.items() if name in names}
+    found = constants | {name: ratio for name, ratio in USUAL_POISSON_RATIOS.items() if name in names}
     if "G12" in found:
         if ("E1" in names) != ("E2" in names):
             found["E1"] = found["E2"] = found["E2" if "E1" in names else "E1"]
         if "nu12" in names and found["E2"] > 1.5 * found["E1"]:  # the ratio of the stiffer direction
             found["nu12"] *= found["E1"] / found["E2"]
         if "G12" in names:
-            found["G12"] = np.sqrt(found["E1"] * found["E2"]) / (2 + 2 * ASSUMED["nu12"])
+            found["G12"] = np.sqrt(found["E1"] * found["E2"]) / (2 + 2 * USUAL_POISSON_RATIOS["nu12"])
     return found
 
 
-def moderate(constants: dict[str, Any]) -> dict[str, Any]:
+def limit_anisotropy(constants: dict[str, Any]) -> dict[str, Any]:
     """Constants of a material that elements can follow, where those of an orthotropic one are extreme."""
     if "G12" not in constants:
         return constants
@@ -137,7 +137,7 @@ class Model:
         """Residuals of each block over its noise, without shifts; beside them their derivatives by named constants."""
         found, scales, steps = [], iter(noise), 1e-30j * np.eye(len(names))  # complex steps are exact
         for family, own, angle in self.tests:
-            slopes = [entries(varied(constants, names, step), angle).imag / 1e-30 for step in steps]
+            slopes = [entries(vary(constants, names, step), angle).imag / 1e-30 for step in steps]
             columns = np.stack([entries(constants, angle), *slopes], axis=-1)
             moved = family.solve(columns.reshape(-1, columns.shape[-1]))
             for block in own:
@@ -164,9 +164,9 @@ class Model:
         """Model without values that are no measurements, and notes on these."""
         notes, kept = [], []
         for block, table in zip(self.blocks, self.general(constants)):
-            floor = 10 * MODEL * np.sqrt(np.mean(table[:, 0] ** 2))
+            floor = 10 * REFERENCE_ERROR * np.sqrt(np.mean(table[:, 0] ** 2))
             columns = block.by_place(np.hstack([table, block.shifts]))
-            stay = measured(block.by_place(block.values), columns, block.places, floor)
+            stay = find_measurements(block.by_place(block.values), columns, block.places, floor)
             kept.append(block.only(stay))
             if not stay.all():
                 where = ", ".join(f"{1e3 * one:.4g} mm" for one in np.atleast_2d(block.places[~stay])[0])
@@ -180,10 +180,10 @@ class Model:
     def undetermined(self, constants: dict[str, Any], names: Sequence[str]) -> list[str]:
         """Named constants whose derivatives are combinations of those by the others."""
         slopes = np.concatenate(self.residuals(constants, names, self.sizes))[:, 1:]
-        slopes *= [RATIO if name in ASSUMED else 1 for name in names]
+        slopes *= [POISSON_STEP if name in USUAL_POISSON_RATIOS else 1 for name in names]
         triangle, order = qr(slopes, mode="r", pivoting=True)
         own = np.abs(np.diag(triangle))
-        rank = int(np.count_nonzero(own > NULL * own[0]))
+        rank = int(np.count_nonzero(own > LEAST_DERIVATIVE * own[0]))
         labels, unknowns = ", ".join(block.label for block in self.blocks), ", ".join(names)
         if self.counts.sum() <= max(rank, 1) or self.counts.min() < 1:
             count = f"{max(self.counts.sum(), 0)} numbers besides the shift"
@@ -207,7 +207,7 @@ class Model:
 
         @lru_cache(maxsize=1)  # values and slopes are asked for in turn
         def tables(steps: bytes, noise: bytes) -> list[np.ndarray]:
-            tried = varied(constants, names, np.frombuffer(steps))
+            tried = vary(constants, names, np.frombuffer(steps))
             if "G12" in tried and tried["nu12"] ** 2 > tried["E1"] / tried["E2"]:  # not positive definite
                 return [np.full((len(block.values), 1), np.inf) for block in self.blocks]  # a shorter step follows
             return self.residuals(tried, names, np.frombuffer(noise))
@@ -231,7 +231,7 @@ class Model:
                 break
         half = t.ppf(0.975, freedom.sum()) * np.linalg.norm(inverse(table(steps)[:, 1:]), axis=1)
         found = list(tables(steps.tobytes(), noise.tobytes()))
-        return varied(constants, names, steps), found, noise, half.clip(max=600)  # exp(700) is infinite
+        return vary(constants, names, steps), found, noise, half.clip(max=600)  # exp(700) is infinite
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -362,26 +362,26 @@ def identify(
     >>> f"{found.values['E'] / 1e9:.0f} GPa", found.undetermined
     ('74 GPa', ('nu',))
     """
-    constants_of_law = chosen(SHEET_LAWS, law, "law")
+    constants_of_law = choose(SHEET_LAWS, law, "law")
     tests = list(tests) if isinstance(tests, Sequence) else [tests]
     for test in tests:
         is_a(test, MeasuredTest, "tests", "springtune.MeasuredTest(beam, 'traction', 'pull.csv')")
-    bodies = [stated(test) for test in tests]
+    bodies = [body_of_test(test) for test in tests]
     parts = sorted({part for shape, _, mesh in bodies for part in (parts_of(mesh) if mesh else ("", *shape.parts))})
     regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []
     if len(parts) > 1 and not regions:
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")
     constants, free = _start([*regions, *constants_of_law], known or {})
-    moduli = [name for name in free if name not in ASSUMED]
+    moduli = [name for name in free if name not in USUAL_POISSON_RATIOS]
     for turn in range(5):  # elements for a usual material, then for what was found, until what is assumed settles
         solved = []
         for test, body in zip(tests, bodies):
-            own = dict(zip(parts, entries(moderate(constants), test.angle).tolist()))
+            own = dict(zip(parts, entries(limit_anisotropy(constants), test.angle).tolist()))
             family = Family(*body, {part: AnisotropicMaterial(*one) for part, one in own.items()})
             solved.append((family, blocks(test, family, body[1]), test.angle))
         model = Model(solved)
         model, notes = model.cleaned(constants)
-        constants = varied(constants, moduli, [_scale(model, constants)] * len(moduli))
+        constants = vary(constants, moduli, [_scale(model, constants)] * len(moduli))
         lacking, found, *_ = _fitted(model, constants, free)
         settled = all(np.isclose(constants[name], found[name], rtol=0.01) for name in lacking)
         constants = found
@@ -406,14 +406,16 @@ def identify(
 
 def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str, Any], list[str]]:
     """Constants of a usual material, with those that are known, and the names of the others."""
-    constants = {name: ASSUMED.get(name, 1e9) for name in names}
+    constants = {name: USUAL_POISSON_RATIOS.get(name, 1e9) for name in names}
     for name, value in known.items():
         if name not in names:
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
-        if name in ASSUMED and not -1 < number_of(value) <= 0.5:
+        if name in USUAL_POISSON_RATIOS and not -1 < number_of(value) <= 0.5:
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
-        constants[name] = number_of(value) if name in ASSUMED else positive(value, "stress", f"known: {name}")
-    constants = assumed(constants, [name for name in {"nu12": 0, "G12": 0} if name in names and name not in known])
+        constants[name] = (
+            number_of(value) if name in USUAL_POISSON_RATIOS else positive(value, "stress", f"known: {name}")
+        )
+    constants = assume_usual(constants, [name for name in {"nu12": 0, "G12": 0} if name in names and name not in known])
     if len(known) == len(names):
         raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
     return constants, [name for name in names if name not in known]
@@ -439,11 +441,15 @@ def _fitted(
     """What tests do not tell, and `Model.fit` of the others; refuses fields of other loads."""
     lacking = model.undetermined(constants, free)
     names = [name for name in free if name not in lacking]
-    constants, tables, noise, half = model.fit(assumed(constants, lacking), names)
+    constants, tables, noise, half = model.fit(assume_usual(constants, lacking), names)
     for block, table, left in zip(model.blocks, tables, squares(tables, noise)):
         own = block.unshifted(block.values)
         share = left / (own @ own or 1)
-        if block.places.ndim > 1 and share > 1 - EXPLAINED and excess(block.by_place(table[:, 0]), block.places) > 0:
+        if (
+            block.places.ndim > 1
+            and share > 1 - EXPLAINED_SHARE
+            and correlation_excess(block.by_place(table[:, 0]), block.places) > 0
+        ):
             explained = f"the load explains {100 * max(1 - share, 0):.0f} % of it"
             raise TestDataError(f"{block.label}: {explained}; check load, columns and signs")
     return lacking, constants, tables, noise, half
@@ -455,12 +461,12 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
     names = [name for name in free if name not in lacking]
     odd = _checked(model, constants, tables, noise)
     notes = [f"{name}: not determined by these data; {REMEDIES.get(name, 'add a force')}" for name in lacking] + notes
-    for name in np.array(names)[half > POOR]:
+    for name in np.array(names)[half > POOR_HALF_INTERVAL]:
         notes.append(f"{name}: poorly determined by these data; {REMEDIES.get(name, 'add a test')}")
     residuals = {block.label: table[:, 0] for block, table in zip(model.blocks, tables)}
     fitted = {name: value if name in names else np.nan for name, value in constants.items()}
-    low, high = (varied(fitted, names, one) for one in (-half, half))
-    for name in [name for name in ASSUMED if high.get(name, 0) < 0]:
+    low, high = (vary(fitted, names, one) for one in (-half, half))
+    for name in [name for name in USUAL_POISSON_RATIOS if high.get(name, 0) < 0]:
         remedy = "if this is none of them, change the sign of v or of the transverse displacement, or let y run upwards"
         odd.append(f"{name}: is below zero, as of few materials; {remedy}")
     values = {name: float(value) for name, value in constants.items()}
@@ -488,14 +494,14 @@ def _checked(model: Model, constants: dict[str, Any], tables: list[np.ndarray], 
     ends = np.cumsum([len(table) for table in tables])[:-1]
     notes, misfit = [], False
     for block, one, own, follows in zip(model.blocks, noise, np.split(rest, ends), np.split(law, ends)):
-        error = MODEL * np.sqrt(np.mean(block.values**2)) / one
+        error = REFERENCE_ERROR * np.sqrt(np.mean(block.values**2)) / one
         misfit |= bool(np.sqrt(np.mean(follows**2)) > error)
-        if excess(block.by_place(own), block.places) > error**2:
+        if correlation_excess(block.by_place(own), block.places) > error**2:
             why = "so the intervals are too narrow; leave out where the law does not hold"
             if block.places.ndim > 1:
                 why += ", check load and supports, and give fewer points of overlapping subsets"
             notes.append(f"{block.label}: residuals are not random, {why}")
-    if misfit and f.sf((along @ along / extra) / (rest @ rest / freedom), extra, freedom) < CHANCE:
+    if misfit and f.sf((along @ along / extra) / (rest @ rest / freedom), extra, freedom) < MISFIT_PROBABILITY:
         why = "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold"
         notes.append(f"{why}; check the law, the angle, known constants, and the signs of columns")
     return notes

@@ -22,7 +22,7 @@ from ..problem.rubber import TestDataError
 from ..problem.shapes import LoadCase, Segment, Shape
 from ..reference.by_constants import Family
 from ..safe_io.inputs import csv_rows, number_of, numbers
-from .mesh_cache import chosen
+from .mesh_cache import choose
 from .meshes import A_BEAM, is_a
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")
@@ -33,10 +33,10 @@ HEADS = "give columns such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u 
 GAUGES = ("gauge-1", "gauge-2")
 """Points of a beam between which ``transverse`` is measured: the middles of the sides beside the load."""
 
-LARGEST_NUMBER = 1e30
+LARGEST_MEASUREMENT = 1e30
 """Number beyond which a cell has no measurement, but the largest number of a program."""
 
-OFF_BODY = 1e-3
+MOST_DISTANCE_FROM_BODY = 1e-3
 """Distance from the body, over its extent, up to which a point counts as on its outline."""
 
 
@@ -124,7 +124,7 @@ class MeasuredTest:
 
     def __post_init__(self) -> None:
         is_a(self.body, Beam | Shape, "body", A_BEAM)
-        chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
+        choose(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         columns, lines, missing = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)
         if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
@@ -133,7 +133,7 @@ class MeasuredTest:
         put(self, force=None if self.force is None else positive(self.force, "force", "force"))
 
 
-def stated(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
+def body_of_test(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
     """Body of a test as a shape, its load case, and the mesh of a file; a beam is loaded by 1 N."""
     body = test.body
     if isinstance(body, Shape):
@@ -159,7 +159,7 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
     points, values = (np.column_stack([test.columns[name] for name in pair]) for pair in ("xy", "uv"))
     rows, apart = family.at(points)
     worst = int(np.argmax(apart))
-    if apart[worst] > OFF_BODY:
+    if apart[worst] > MOST_DISTANCE_FROM_BODY:
         x, y = 1e3 * points[worst]
         where = f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm"
         raise TestDataError(f"{where} is outside of the body; correct it")
@@ -221,7 +221,7 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
     used = [name if name in FIELD_COLUMNS or not of_field else "" for name in names]
     every = len(rows)
     if of_field:
-        rows = [row for row in rows if len(row[1]) != len(used) or not any(map(_absent, used, row[1]))]
+        rows = [row for row in rows if len(row[1]) != len(used) or not any(map(_is_missing, used, row[1]))]
     table = np.array(numbers(path, rows, used, TestDataError)).reshape(-1, len(used))
     columns = {}
     for name, (_, _, unit), values in zip(used, parts, table.T):
@@ -231,7 +231,7 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
             scale = positive(f"1 {unit}", "force" if name == "force" else "length", f"column {name!r}")
         except ValueError as error:
             raise TestDataError(f"'{path}', line {line}: {error} in '[ ]'") from None
-        if (far := np.abs(values) > LARGEST_NUMBER / scale).any():
+        if (far := np.abs(values) > LARGEST_MEASUREMENT / scale).any():
             worst = int(np.argmax(far))
             where = f"'{path}', line {rows[worst][0]}, column {name!r}"
             raise TestDataError(f"{where}: {values[worst]:g} {unit} is beyond all measure; correct it")
@@ -241,8 +241,8 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
     return columns, [number for number, _ in rows], every - len(rows)
 
 
-def _absent(name: str, text: str) -> bool:
+def _is_missing(name: str, text: str) -> bool:
     """Whether a cell of a field says that nothing was measured: empty, NaN, a word, or the largest number."""
     if not name or not re.search("[0-9]", text) or "#" in text:
         return bool(name) and not math.isfinite(number_of(text))
-    return LARGEST_NUMBER < abs(number_of(text)) < math.inf
+    return LARGEST_MEASUREMENT < abs(number_of(text)) < math.inf

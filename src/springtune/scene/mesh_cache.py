@@ -26,7 +26,7 @@ from ..problem.status import Status
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
-NETWORKS = 6
+NETWORKS_KEPT = 6
 """Factorized networks of a mesh that are kept; few are enough for scenes in order."""
 
 
@@ -43,10 +43,10 @@ def definition_of(definition: AnyDefinition) -> Definition:
     if callable(definition):
         name = getattr(definition, "__name__", type(definition).__name__)
         return Definition(name, definition, inf, False, (3, 4), False, "", True, False)
-    return chosen(DEFINITIONS, definition, "definition")
+    return choose(DEFINITIONS, definition, "definition")
 
 
-def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
+def choose(known: Mapping[str, Entry], name: object, what: str) -> Entry:
     """Entry of a mapping, or an error that lists the known names."""
     if isinstance(name, str) and name in known:
         return known[name]
@@ -63,7 +63,7 @@ def check_stiffness(definition: Definition, stiffness: object) -> None:
 
 
 @contextmanager
-def named(definition: Definition) -> Iterator[None]:
+def naming_errors(definition: Definition) -> Iterator[None]:
     """Context that adds the name of a definition to its errors."""
     try:
         yield
@@ -110,7 +110,7 @@ class Solution:
     displacement: float
 
 
-def solved(
+def solve_and_judge(
     problem: StaticProblem, load: float, kinematics: str, displacement: Callable[[np.ndarray], float]
 ) -> Solution:
     """Equilibrium of a problem, judged; `displacement` reads its value from displacements [m], (n_points, 2)."""
@@ -129,7 +129,9 @@ class MeshCache:
     of load, `filled` the beams that the mesh is known to fill, `references` those of load cases of a shape.
     """
 
-    def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "MeshCache | None" = None) -> None:
+    def __init__(
+        self, mesh: Mesh, thickness: float, networks: int = NETWORKS_KEPT, like: "MeshCache | None" = None
+    ) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
@@ -232,7 +234,9 @@ class MeshCache:
     ) -> Solution:
         """Equilibrium of springs under a force with its sign [N], judged."""
         problem = self.problem(kind, springs, follower)
-        return solved(problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved))
+        return solve_and_judge(
+            problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved)
+        )
 
     def displacement(self, kind: LoadKind, displacements: np.ndarray) -> float:
         """Displacement of a load [m] from those of the particles [m], shape (n_points, 2)."""

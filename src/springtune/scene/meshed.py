@@ -10,7 +10,7 @@ from ..mesh.sides import OutlineSide
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import Shape
 
-OFF_SIDE = 1e-5
+MOST_DISTANCE_FROM_SIDE = 1e-5
 """Largest distance of a particle from its side of a shape, over its extent: text formats have few digits."""
 
 LEAST_COVERED = 0.9
@@ -23,7 +23,7 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
         return
     what, remedy = f"shape {shape.name!r}", "mesh it with springtune.mesh_shape"
     mesh, (low, high) = grouped.mesh, shape.extent
-    small = OFF_SIDE * max(high[0] - low[0], high[1] - low[1])
+    small = MOST_DISTANCE_FROM_SIDE * max(high[0] - low[0], high[1] - low[1])
 
     def filled(part: str | None) -> object:
         """Material of a part, or the name of a part that the mesh lacks; None for nothing."""
@@ -46,7 +46,7 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
         ends = mesh.points[grouped.sides[name]]
         away = np.min([_distances(side, ends.reshape(-1, 2)) for side in own], axis=0)
         share = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / sum(side.length for side in own)
-        if away.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + OFF_SIDE:
+        if away.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + MOST_DISTANCE_FROM_SIDE:
             raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of {what}; {remedy}")
     for name, point in shape.points.items():
         if name in grouped.points and np.linalg.norm(np.subtract(grouped.points[name], point)) > small:

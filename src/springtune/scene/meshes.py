@@ -12,9 +12,9 @@ from ..mesh.types import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive
-from .mesh_cache import chosen
+from .mesh_cache import choose
 
-FILLED = 1e-6
+MOST_GAP = 1e-6
 """Largest gap between a mesh and its beam, over the beam's extent."""
 
 
@@ -42,7 +42,7 @@ def check_filled(mesh: Mesh, beam: Beam) -> None:
     """Refuse a mesh that does not fill its beam exactly once, as its reference does."""
     low, high, box = mesh.points.min(axis=0), mesh.points.max(axis=0), np.array([beam.length, beam.height])
     remedy = "make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
-    if np.abs(np.concatenate([low, high - box])).max() > FILLED * box.max():
+    if np.abs(np.concatenate([low, high - box])).max() > MOST_GAP * box.max():
         shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
         wanted = " x ".join(f"{side:.6g}" for side in 1e3 * box)
         raise ValueError(f"mesh: extends over {shown} mm, its beam over {wanted} mm from the origin; {remedy}")
@@ -79,7 +79,7 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
     (415, 1143)
     """
     is_a(beam, Beam, "beam", A_BEAM)
-    make, edge = chosen(MESH_TYPES, mesh_type, "mesh type"), positive(size, "length", "mesh size")
+    make, edge = choose(MESH_TYPES, mesh_type, "mesh type"), positive(size, "length", "mesh size")
     refusal = make.refusal(beam.length, beam.height, edge, f"beam {beam.name!r}")
     if refusal:
         raise ValueError(f"mesh size: {size!r} {refusal}")

@@ -9,7 +9,7 @@ from ..mechanics.moduli import PatchTest
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, Material
 from ..springs.base import DefinitionError, Springs
-from .mesh_cache import AnyDefinition, MeshCache, definition_of, named
+from .mesh_cache import AnyDefinition, MeshCache, definition_of, naming_errors
 from .meshes import A_MATERIAL, A_MESH, is_a
 
 
@@ -172,5 +172,5 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(f"definition {definition.name!r} is told its stiffness; choose one such as 'uniform'")
-    with named(definition):
+    with naming_errors(definition):
         return MeshModuli(mesh)(material, definition)

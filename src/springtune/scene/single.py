@@ -26,7 +26,7 @@ from ..registry import hook
 from ..safe_io.tables import Tabled, number_text
 from ..springs.base import Springs
 from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
-from .mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, named
+from .mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, naming_errors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -192,7 +192,7 @@ class Scene(Tabled):
 
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
-        with named(self.definition):
+        with naming_errors(self.definition):
             return self.boundary_problem.springs(self.definition, self.uniform_stiffness)
 
     @cached_property

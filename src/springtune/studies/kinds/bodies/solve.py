@@ -16,7 +16,7 @@ from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 from springtune.reference.answers import field_error, interpolate
 from springtune.scene.boundary_problem import BeamProblem, ShapeProblem
-from springtune.scene.mesh_cache import MeshCache, definition_of, named
+from springtune.scene.mesh_cache import MeshCache, definition_of, naming_errors
 from springtune.springs.base import DEFINITIONS, DefinitionError
 
 from ...runs.source import hash_of
@@ -166,7 +166,7 @@ def solve_shape(described, grouped, sheets, task):
         about = ShapeProblem(shape, grouped, materials, LOAD_NAME, 1.0, kinematics, sheet)
         about.check(definition)
         sheets[shape.thickness] = about.sheet
-        with named(definition):
+        with naming_errors(definition):
             springs, seconds = about.springs(definition, None)
         solution, result = _solve_problem(about, springs, seconds, task)
     # Loads on what is held, quantities that the mesh has not, definitions that refuse it; mechanisms.
