@@ -1,4 +1,4 @@
-"""Snakemake logger plugin: a line that moves while a study runs on a terminal, elsewhere a line for each rule."""
+"""Snakemake logger plugin: a moving line of progress on a terminal, elsewhere a line for each rule."""
 
 import os
 import sys
@@ -15,17 +15,17 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from springtune.safe_io.tables import clock as clock_text
 
 PAUSE = 0.5
-"""Time between two pictures of the line that moves [s]."""
+"""Time between two updates of the moving line [s]."""
 
 LINE = "\r\x1b[?7l{}\x1b[K\x1b[?7h"
-"""Writes over the line of the cursor; the terminal cuts what is too long."""
+"""Overwrites the line of the cursor; the terminal cuts long lines."""
 
 NUMBERS = {LogEvent.JOB_INFO: "jobid", LogEvent.JOB_FINISHED: "job_id", LogEvent.JOB_ERROR: "jobid"}
-"""Attribute with the number of the job, by event: the job runs, is done, or failed."""
+"""Attribute of a record with the job's number, by event: the job runs, is done, or failed."""
 
 
 class Display:
-    """Display of a run until `stop`; `counts` has the number of jobs of each rule."""
+    """Progress of a run until `stop`; `counts` has the number of jobs of each rule."""
 
     def __init__(
         self, counts: Mapping[str, int], stream: TextIO, moves: bool, clock: Callable[[], float] = time.monotonic
@@ -36,8 +36,8 @@ class Display:
         if moves:
             threading.Thread(target=self._move, daemon=True).start()
 
-    def follow(self, event: LogEvent, number: int, rule: str) -> None:
-        """Note what became of a job; elsewhere than on a terminal, write a line when its rule is done."""
+    def record_event(self, event: LogEvent, number: int, rule: str) -> None:
+        """Record the event of a job; without a terminal, write a line when its rule is done."""
         if event == LogEvent.JOB_INFO:
             self.rules[number] = rule
         for what, jobs in self.jobs.items():
@@ -47,21 +47,21 @@ class Display:
             if sum(self.rules.get(one) == rule for one in self.jobs[event]) == self.counts.get(rule):
                 self._write(f"{rule}: done; {self.line()}\n")
 
-    def tell(self, write: Callable[[], None]) -> None:
-        """Write something else, above the line that moves."""
+    def write_above(self, write: Callable[[], None]) -> None:
+        """Write something else above the moving line."""
         with self.writing:
             if self.moves:
                 self.stream.write(LINE.format(""))
             write()
 
     def stop(self) -> None:
-        """Stop, and remove the line that moves."""
+        """Stop, and remove the moving line."""
         self.over.set()
         if self.moves:
             self._write(LINE.format(""))
 
     def line(self) -> str:
-        """Jobs done, times gone by and left at the rate so far, and the rules of the jobs that run."""
+        """Numbers of jobs, elapsed and remaining time, and the rules of running jobs."""
         gone, count = self.clock() - self.begun, self.counts["total"]
         running, done, failed = self.jobs.values()
         left = f", about {clock_text(gone * (count - len(done)) / len(done))} left" if 0 < len(done) < count else ""
@@ -84,9 +84,9 @@ class Display:
 class LogHandler(LogHandlerBase):
     """Handler of Snakemake's records.
 
-    A run shows its progress, warnings, errors and its end; Snakemake's log file has all lines. What comes before is
-    held back until a run begins, and written if none does. Runs with ``--dry-run``, ``--printshellcmds``,
-    ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's own lines.
+    A run shows its progress, warnings, errors and summary. Records before a run are held back, and written if no run
+    begins. Runs with ``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's
+    own lines.
     """
 
     writes_to_stream = True
@@ -106,13 +106,13 @@ class LogHandler(LogHandlerBase):
         try:
             self._show(record)
         except Exception:
-            # A display that fails must not take what the run has to say with it.
+            # If the display fails, the messages of the run must still appear.
             self.wanted = False
             self._stop()
             self.plain.emit(record)
 
     def close(self) -> None:
-        """Restore the terminal, and write what is held back."""
+        """Restore the terminal, and write held-back records."""
         self._stop()
         super().close()
 
@@ -138,12 +138,12 @@ class LogHandler(LogHandlerBase):
         else:
             display = self.display
             if event in NUMBERS:
-                display.follow(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
+                display.record_event(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
             if record.levelno >= WARNING:
-                display.tell(lambda: self.plain.emit(record))
+                display.write_above(lambda: self.plain.emit(record))
 
     def _stop(self) -> None:
-        """Remove the display, or write what was held back for want of one."""
+        """Remove the display, and write held-back records."""
         if self.display is not None:
             self.display.stop()
             self.display = None

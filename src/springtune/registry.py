@@ -1,9 +1,8 @@
-"""Registries of what has a name in studies, and imports by text.
+"""Registries of definitions, engines, loads and mesh types, and imports by name.
 
-A decorator adds a function to a mapping. On first use the mapping imports all modules of a package to find what they
-declare. Code outside the package uses the same decorator. Other packages declare more by entry points of the groups
-``springtune.definitions``, ``springtune.engines``, ``springtune.loads`` and ``springtune.mesh_types``. They are
-imported when their name is asked for, or all names.
+A decorator adds a function to a mapping, which imports the modules of its package on first use. Other packages add
+entries by entry points of the groups ``springtune.definitions``, ``springtune.engines``, ``springtune.loads`` and
+``springtune.mesh_types``.
 """
 
 import inspect
@@ -27,11 +26,11 @@ import linter would find circles, and a new figure would change the keys of resu
 
 
 PLUGINS_VARIABLE = "SPRINGTUNE_PLUGINS"
-"""Environment variable; ``none`` leaves out what other packages declare."""
+"""Environment variable; ``none`` ignores the entry points of other packages."""
 
 
 class PluginWarning(UserWarning):
-    """What another package declares is left out; the message says why."""
+    """An entry point of another package is left out; the message says why."""
 
 
 GROUPS = ("definitions", "engines", "loads", "mesh_types")
@@ -55,15 +54,12 @@ def _package(one: "EntryPoint") -> str:
 
 @cache
 def plugin_packages() -> set[str]:
-    """Top-level modules of the packages that declare something by entry points."""
+    """Top-level modules of the packages with entry points."""
     return {one.module.partition(".")[0] for group in plugins().values() for one in group}
 
 
 def import_name(name: str) -> Any:
-    """Import a module of the package, or with ``module:name`` an attribute of it.
-
-    All imports by text use this function: commands, study kinds, stages, outputs, public names and hooks.
-    """
+    """Import a module of the package, or with ``module:name`` an attribute of it."""
     module, _, attribute = name.partition(":")
     found = import_module(f"springtune.{module}")
     return getattr(found, attribute) if attribute else found
@@ -76,7 +72,7 @@ def hook(name: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Declaration:
-    """Function with its name in studies; entries are sorted by `order`, then by name."""
+    """Declared function with its name in studies; entries are sorted by `order`, then by name."""
 
     name: str
     function: Callable[..., Any]
@@ -94,7 +90,7 @@ class Declaration:
 
     @cached_property
     def file(self) -> Path | None:
-        """File where the function stands; None where it was typed into a notebook or a prompt."""
+        """File of the function; None if it was typed into a notebook or a prompt."""
         found = inspect.getsourcefile(inspect.unwrap(self.function))
         return Path(found).absolute() if found and Path(found).is_file() else None
 
@@ -110,10 +106,10 @@ Function = TypeVar("Function", bound=Declaration)
 
 
 class ExtensibleMapping(Mapping[str, Entry]):
-    """Read-only ordered mapping of the package's entries and of those that other packages declare by entry points.
+    """Read-only ordered mapping of the package's entries and of entry points of other packages.
 
-    `adopt` checks an imported object and returns the entry. What it refuses, or what cannot be imported, is left out
-    with a `PluginWarning`. `packages` has the distributions of entries of other packages.
+    `adopt` checks an imported object and returns the entry, or raises ValueError. Failures are left out with a
+    `PluginWarning`. `packages` has the distributions of entries of other packages.
     """
 
     def __init__(
@@ -128,14 +124,14 @@ class ExtensibleMapping(Mapping[str, Entry]):
         """Find the package's own entries."""
 
     def _enter(self, name: str, found: Any) -> None:
-        """Add what another package declares."""
+        """Add the entry of another package."""
         if name in self._entries:
             raise ValueError(f"'{self.packages.get(name, 'springtune')}' has one of that name; it needs another")
         assert self._adopt
         self._entries = self._entries | {name: self._adopt(name, found)}
 
     def _load(self, name: str = "") -> str:
-        """Import the entry points of a name, or all; return why they are left out."""
+        """Import the entry points of a name, or all; return the reasons of failures."""
         self._discover()
         asked = [one for one in plugins()[self._group] if name in ("", one.name)]
         for one in asked:
@@ -207,7 +203,7 @@ class Registry(ExtensibleMapping[Function]):
         self._entries = {one.name: one for one in sorted(entries, key=lambda one: (one.order, one.name))}
 
     def discard(self, name: str) -> None:
-        """Remove what code outside the package declared; unknown names are ignored."""
+        """Remove an entry; unknown names are ignored."""
         self._entries = {one: entry for one, entry in self._entries.items() if one != name}
 
     def _discover(self) -> None:
@@ -223,7 +219,7 @@ class Registry(ExtensibleMapping[Function]):
 
 
 def how_to_install(extra: str) -> str:
-    """Return how an extra is installed; no package index has springtune.
+    """Return how to install an extra; no package index has springtune.
 
     Examples
     --------

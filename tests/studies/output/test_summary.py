@@ -254,11 +254,11 @@ def test_what_is_left_follows_the_rate_so_far():
     now = [1000.0]
     display = Display({"a": 1, "b": 2, "total": 3}, io.StringIO(), True, clock=lambda: now[0])
     display.stop()
-    display.follow(LogEvent.JOB_INFO, 1, "a")
+    display.record_event(LogEvent.JOB_INFO, 1, "a")
     now[0] += 60
     assert display.line() == "0 of 3 jobs, 1:00 min: a"
-    display.follow(LogEvent.JOB_FINISHED, 1, "")
-    display.follow(LogEvent.JOB_INFO, 2, "b")
+    display.record_event(LogEvent.JOB_FINISHED, 1, "")
+    display.record_event(LogEvent.JOB_INFO, 2, "b")
     assert display.line() == "1 of 3 jobs, 1:00 min, about 2:00 min left: b"
-    display.follow(LogEvent.JOB_ERROR, 2, "")
+    display.record_event(LogEvent.JOB_ERROR, 2, "")
     assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 2:00 min left"
