@@ -18,19 +18,19 @@ OTHER_APPROACHES = (
 """Approaches of the benchmark besides definitions, see `springtune.studies.kinds.benchmark.approaches`."""
 
 PARTS = ("meshing", "assembling", "factorizing", "solving")
-"""Parts of the seconds of a case."""
+"""Timed parts of a case."""
 
 THREAD_COUNTS = (1, 2)
 """Numbers of threads of the benchmark's explicit steps."""
 
 
 def approach_names(definitions: Iterable[str], mesh_types: Sequence[str], others: Iterable[str]) -> tuple[str, ...]:
-    """Names of the approaches: ``definition/mesh type``, those that go together, and others."""
+    """Return the names of approaches: ``definition/mesh type`` for pairs that fit, and others."""
     names = []
     for name in definitions:
         for mesh_type in mesh_types:
             made, definition = MESH_TYPES.get(mesh_type), DEFINITIONS[name]
-            # An unknown mesh type is told elsewhere.
+            # The model of the study refuses unknown mesh types.
             if not definition.needs and (made is None or made.corners in definition.cells):
                 names.append(f"{name}/{mesh_type}")
     return (*names, *others)

@@ -11,7 +11,7 @@ from ...output.selection import choose, group
 FIRST_NAMED = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles",
                "quadratic-triangles", "boundary-elements", "tensor-mass", "calculix-cps3",
                "calculix-cps8")  # fmt: skip
-"""Approaches with names before others, which are grey."""
+"""Approaches that are named first; unnamed ones are grey."""
 
 RING_STYLE = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
 
@@ -34,9 +34,9 @@ def benchmark(tree):
 
 @style.styled
 def plot_benchmark(data, ax=None, *, scene=None):
-    """Error over run time: a line an approach, over mesh sizes.
+    """Error over run time, one line per approach over mesh sizes.
 
-    Rings: no other approach that finer meshes confirm is both faster and more accurate.
+    Rings mark approaches that no other confirmed approach beats in both error and time.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     ax : Axes or Figure, optional
         Where to plot; by default a new figure.
     scene : str, optional
-        Scene of the benchmark; may be left out where there is one.
+        Scene; optional if there is only one.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     Raises
     ------
     ValueError
-        If the dataset has no benchmark, or the scene is not there, or left out where there are several.
+        If the dataset has no benchmark or no such scene, or several scenes and none is given.
 
     Examples
     --------
@@ -80,9 +80,9 @@ def plot_benchmark(data, ax=None, *, scene=None):
             look = style.line(shown.index(approach)) | {"label": approach}
         panel.plot(seconds[good], errors[good], **look)
         panel.plot(seconds[ring], errors[ring], "o", **RING_STYLE)
-    panel.set(xlabel="Seconds, from nothing to the displacement", ylabel="|Error| [%]", title=case.scene.item())
+    panel.set(xlabel="Run time from mesh to displacement [s]", ylabel="|Error| [%]", title=case.scene.item())
     if not shown:
-        labels.say(panel, f"No approach has an error and a time: {_missing_cases(case) or 'none was asked for'}.")
+        labels.say(panel, f"No approach has an error and a time: {_missing_cases(case) or 'none was requested'}.")
         return panel
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:

@@ -22,7 +22,7 @@ from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
 
 MOST_RUNS = 100_000
-"""Most combinations of scenes, approaches and mesh sizes that a benchmark measures."""
+"""Most combinations of scenes, approaches and mesh sizes."""
 
 OtherApproach = Annotated[str, *one_of("approach", OTHER_APPROACHES)]
 Seconds = Annotated[float, Field(gt=0, le=3600, title="a number of seconds above 0, such as 0.5")]

@@ -1,4 +1,4 @@
-"""Figures and tables of the benchmark, and what the page to browse shows of it."""
+"""Figures, tables and browse views of the benchmark."""
 
 from ...config.kind import Output
 from ...output.browse import Plot, View
@@ -18,14 +18,14 @@ VIEWS = (
     View(
         "/benchmark",
         "Benchmark",
-        "Error against run time, from nothing to the displacement, of every approach: what is left and low is better.",
+        "Error against run time of every approach, meshing included; lower left is better.",
         (
             Plot("error over seconds", "error", "seconds", "approach", along="mesh_size", log="xy"),
             Plot("assured error over seconds", "assured_error", "seconds", "approach", along="mesh_size", log="xy"),
             Plot("seconds over unknowns", "seconds", "unknowns", "approach", along="mesh_size", log="xy"),
             Plot("error over mesh size", "error", "mesh_size", "approach", log="xy"),
-            Plot("what became of the cases", "status", "mesh_size", "approach", "map"),
-            Plot("springs a second of explicit steps", "spring_updates", "mesh_size", "thread_count", log="x"),
+            Plot("status of the cases", "status", "mesh_size", "approach", "map"),
+            Plot("springs per second of explicit steps", "spring_updates", "mesh_size", "thread_count", log="x"),
         ),
     ),
 )
@@ -36,7 +36,7 @@ CASE_COLUMNS = {
     "assured_error_percent": ("assured_error", 100),
     "time_ms": ("seconds", 1e3),
 } | {f"{part}_ms": (f"{part}_seconds", 1e3) for part in PARTS}
-"""Columns of the table: variable, and the factor on it."""
+"""Columns of the table: variable and factor."""
 
 STEP_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "million_springs_a_second": ("spring_updates", 1e-6)}
 
@@ -53,8 +53,8 @@ def tables(tree):
     cases = listed(data, asked, ("scene", "approach", "status", "message"), CASE_COLUMNS)
     cases = [row | {"status": STATUS[row["status"]]} for row in cases]
     steps = listed(data, data.spring_updates.notnull(), ("precision", "thread_count"), STEP_COLUMNS)
-    note = "Error, and time from nothing to the displacement with its parts: medians of warm runs."
-    about = "Nonlinear springs that explicit steps advance in a second."
+    note = "Error, and run time with its parts, meshing included: medians of warm runs."
+    about = "Nonlinear springs that explicit steps advance per second."
     return [
         {"stem": "benchmark", "title": "Run time against error", "note": note, "rows": cases},
         {"stem": "explicit_steps", "title": "Explicit steps", "note": about, "rows": steps},

@@ -1,6 +1,6 @@
-"""Stage `benchmark`: run time against error, of definitions on all mesh types and of other approaches.
+"""Stage `benchmark`: run time and error of definitions on all mesh types and of other approaches.
 
-The first run of a case imports and reads what the approach needs, and does not count.
+The first run of a case imports what the approach needs, and does not count.
 """
 
 import time
@@ -34,13 +34,13 @@ from .approaches import APPROACHES, network
 REPETITIONS = 3
 
 LONG_CASE_SECONDS = 0.4
-"""Cases above these seconds run once."""
+"""Cases that take longer run once."""
 
 EXPLICIT_UPDATES = 4_000_000
-"""Springs that an explicit run advances, each step counted anew,"""
+"""Springs times steps of a timed explicit run."""
 
 FEWEST_STEPS = 50
-"""in at least so many steps."""
+"""Fewest steps of a timed explicit run."""
 
 
 def failed(task, why):
@@ -108,9 +108,9 @@ class Clock:
 
 
 def measure(scene, cases, most_seconds):
-    """Rows of all cases, which go from coarse to fine, and of the reference.
+    """Rows of the reference and of all cases, from coarse to fine.
 
-    Where an approach fails it has a status and a message; where it exceeds its seconds finer sizes have.
+    A failed case has a status and a message, and so have all finer sizes of an approach that exceeds its seconds.
     """
     clock, beyond, rows = Clock(), {}, defaultdict(list)
     with clock("solving"):

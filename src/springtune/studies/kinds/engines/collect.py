@@ -22,7 +22,7 @@ RUN_COORDINATES = {
     "scene_force": (("scene",), "N", "magnitude of the force", nan),
     "program": (("engine",), "1", "program that the engine is of", ""),
 }
-"""What scenes and engines are."""
+"""Descriptions of scenes and engines."""
 
 
 def _variables(cell):
@@ -58,7 +58,7 @@ ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "iterations": "iterations of the solver in a step",
     FACTOR: "factor on all stiffnesses that are typed",
 }
-"""Own dimensions."""
+"""Dimensions of these groups."""
 
 BEST_VARIABLES = {
     "best_factor": (RUN, "1", "factor at which the displacement is the reference's", nan),
@@ -98,8 +98,8 @@ def _best_factor(points):
             found.append(1 / ((1 - share) / below + share / above))
     if found:
         return {"best_factor": min(found, key=lambda factor: abs(np.log(factor)))}
-    said = f"{len(known)} of {len(points)} runs are at rest, and two are needed"
+    why = f"{len(known)} of {len(points)} runs came to rest; two are needed"
     if len(known) > 1:
         factor, error = min(known, key=lambda one: abs(one[1]))
-        said = f"no factor from {known[0][0]:g} to {known[-1][0]:g} is right; {factor:g} is off by {100 * error:+.3g} %"
-    return {"best_factor_message": said}
+        why = f"no factor from {known[0][0]:g} to {known[-1][0]:g} is right; {factor:g} is off by {100 * error:+.3g} %"
+    return {"best_factor_message": why}

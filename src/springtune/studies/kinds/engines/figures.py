@@ -10,7 +10,7 @@ from ...output.text import cell_text
 from . import RUN_ENDS, SETTING
 
 FRAME_SECONDS = 1 / 60
-"""Time of motion that costs are given for [s]."""
+"""Motion that costs refer to [s]."""
 
 
 def engines(tree):
@@ -39,9 +39,9 @@ def _runs(data, name, scene):
 
 @style.styled
 def plot_engine_errors(data, ax=None, *, scene=None):
-    """Error over the time of a frame: a line an engine joins the settings that no other of its settings beats.
+    """Error over the time of a frame: one line per engine joins its unbeaten settings.
 
-    Times are for 1/60 s of motion, so that settings with other frames can be compared. Small markers are all settings.
+    Times are per 1/60 s of motion, so settings with different frames compare. Small markers are all settings.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     ax : Axes or Figure, optional
         Where to plot; by default a new figure.
     scene : str, optional
-        Scene; may be left out where there is one.
+        Scene; optional if there is only one.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     Raises
     ------
     ValueError
-        If the dataset has no scenes in engines, or the scene is not there, or left out where there are several.
+        If the dataset has no scenes in engines or no such scene, or several scenes and none is given.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
 
 @style.styled
 def plot_engine_curves(data, ax=None, *, scene=None):
-    """Sensitivity curves in engines: displacement over the reference's against the typed factor, a panel an engine.
+    """Sensitivity curves in engines: displacement over the reference by stiffness factor, one panel per engine.
 
     Parameters
     ----------
@@ -110,18 +110,18 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     ax : Figure or sequence of Axes, optional
         Where to plot: as many Axes as panels; by default a new figure.
     scene : str, optional
-        Scene; may be left out where there is one.
+        Scene; optional if there is only one.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes
-        One an engine that ran, with the definition where there are several.
+        One per engine that ran, and per definition if there are several.
 
     Raises
     ------
     ValueError
-        If the dataset has no curves in engines, or the scene is not there, or left out where there are several, or
-        ``ax`` has another number of Axes.
+        If the dataset has no curves in engines or no such scene, several scenes and none is given, or ``ax`` has
+        another number of Axes.
 
     Examples
     --------

@@ -21,13 +21,13 @@ from . import SETTING
 from .outputs import OUTPUTS
 
 MOST_ENGINE_RUNS = 10_000
-"""Most combinations of one set of runs; each takes a tenth of a second and more."""
+"""Most combinations of one set of runs; each takes at least a tenth of a second."""
 
 RUN_KEYS = ("definition", "engine", *SETTING, "stiffness_factor")
-"""What a set of runs lists values of, besides scenes."""
+"""Keys of a set of runs that list values, besides scenes."""
 
 OWN_PRECISION = "own"
-"""The first precision of each engine."""
+"""Precision that stands for the first one of an engine."""
 
 
 Count = Annotated[int, Field(ge=1, le=100_000, title="a whole number from 1 to 100000, such as 10")]
@@ -106,10 +106,7 @@ class EnginesConfig(Section):
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine: labels of its cell, with the time of a frame [s] and what they stand for, and values.
-
-    Runs `of_curve` have factors on what is typed.
-    """
+    """A run of a scene in an engine: labels and values; runs `of_curve` have stiffness factors."""
 
     labels: dict[str, str | float]
     of_curve: bool
@@ -171,8 +168,8 @@ def _expand(config, declared):
 def _summary(runs):
     engines = dict.fromkeys(run.labels["engine"] for run in runs)
     absent = [name for name in engines if _engines()[name].absent]
-    told = f"; not installed: {', '.join(absent)}" if absent else ""
-    return [["engines", len(runs), f"runs in {', '.join(engines)}{told}"]]
+    missing = f"; not installed: {', '.join(absent)}" if absent else ""
+    return [["engines", len(runs), f"runs in {', '.join(engines)}{missing}"]]
 
 
 def _version(engine):

@@ -1,4 +1,4 @@
-"""Figures and table of runs in engines, and what the page to browse shows of them."""
+"""Figures, table and browse views of runs in engines."""
 
 from ...config.kind import Output
 from ...output.browse import Plot, View
@@ -23,7 +23,7 @@ VIEWS = (
     View(
         "/engines",
         "Engines",
-        "Scenes in engines at rest: how far off at a setting, and what a frame takes.",
+        "Scenes in engines at rest: error and time of a frame by setting.",
         (
             Plot("error over iterations", "error", "iterations", "engine", log="xy"),
             Plot("error over the time of a frame", "error", "frame_seconds", "engine", along="iterations", log="xy"),
@@ -37,7 +37,7 @@ VIEWS = (
     View(
         "/engine_curves",
         "Engine curves",
-        "Sensitivity curves in engines: the error over a factor on the stiffness that is typed.",
+        "Sensitivity curves in engines: error by the factor on the typed stiffness.",
         (
             Plot("error over the typed factor", "error", "stiffness_factor", "engine", log="xy"),
             Plot("error over the typed factor, by iterations", "error", "stiffness_factor", "iterations", log="xy"),
@@ -55,7 +55,7 @@ ENGINE_COLUMNS = {
     "solver_error_percent": ("solver_error", 100),
     "frame_ms": ("frame_seconds", 1e3),
 }
-"""Columns of the table: variable, and the factor on it."""
+"""Columns of the table: variable and factor."""
 
 
 def tables(tree):
@@ -69,5 +69,5 @@ def tables(tree):
     names = ("scene", "definition", "engine", "precision", "substeps", "iterations", "engine_status", "message")
     rows = listed(data, data.status != 0, names, ENGINE_COLUMNS)
     rows = [row | {"engine_status": RUN_ENDS[row["engine_status"]]} for row in rows]
-    note = "Where the load rests, beside finite elements: errors of the definition, in equilibrium, and of the solver."
+    note = "Displacement at rest against finite elements: error of the definition in equilibrium, and of the solver."
     return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

@@ -15,30 +15,30 @@ def laying(tree):
 
 @style.styled
 def plot_laying(data, ax=None, *, loading=None, friction=None):
-    """Strips laid on a trapezoid: a row a loading and friction with the shape, the area's error and the elongation.
+    """Strips laid on a trapezoid: shape, area error and elongation, one row per loading and friction.
 
-    Networks look alike, so that only the shape of one is drawn; the numbers tell them apart.
+    Networks look alike, so only one shape is drawn.
 
     Parameters
     ----------
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/laying``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: three Axes a row; by default a new figure.
+        Where to plot: three Axes per row; by default a new figure.
     loading : str, optional
-        One loading in place of all.
+        Show this loading only.
     friction : float, optional
-        One coefficient of friction [1] in place of all.
+        Show this coefficient of friction [1] only.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_rows, 3)
-        Of each loading and friction the shape, the error of the area, and the elongation.
+        Shape, area error and elongation of each loading and friction.
 
     Raises
     ------
     ValueError
-        If the dataset has no laid strips, or nothing has the loading or friction, or ``ax`` is not three Axes a row.
+        If the dataset has no laid strips, or not the loading or friction, or ``ax`` is not three Axes per row.
 
     Examples
     --------
@@ -121,7 +121,7 @@ def _draw_dots(panel, laid, names, variable):
         panel.plot(values[solved[1:]], np.full(len(solved[1:]), number), markerfacecolor="white", **mark)
         panel.plot(values[solved[:1]], np.full(len(solved[:1]), number), markersize=4.5, label=definition, **mark)
         if not len(solved):
-            said = ", ".join(labels.statuses(strips.status.values)) or "not asked for"
+            said = ", ".join(labels.statuses(strips.status.values)) or "not requested"
             panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
                        fontsize=style.SMALL, color="0.25")  # fmt: skip
     panel.set_yticks(range(len(names)), map(no_mathematics, names))

@@ -19,19 +19,19 @@ from ...runs.plan import Task
 from .outputs import OUTPUTS
 
 LOADINGS = ("pressure", "gravity", "ends")
-"""What lays a strip: a pressure on its upper face, its weight, or its ends, which are drawn down to the floor."""
+"""Loadings: a pressure on the upper face, the weight, or ends pulled down to the floor."""
 
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
-"""Mesh sizes of a reference over the given one; the first gives the answer, all of them its band."""
+"""Mesh sizes of a reference over the given one; the first gives the answer, all give the error band."""
 
 LOADING, NETWORK = ("loading", "friction"), ("definition", "mesh_size")
 STRIP = (*NETWORK, *LOADING)
-"""Labels of a strip of springs; a reference has the first ones."""
+"""Dimensions of a loading, of a network, and of a network under a loading."""
 
 BAND_MEANING = "twice its spread over three meshes of finite elements"
 
 MOST_STRIPS = 10_000
-"""Most strips that a study lays; each takes seconds."""
+"""Most strips of a study; each takes seconds."""
 
 Friction = Annotated[float, Field(ge=0, le=2, title="a coefficient from 0 to 2, such as 0.3")]
 Loading = Annotated[str, *one_of("loading", LOADINGS)]

@@ -1,4 +1,4 @@
-"""Figure and table of laid strips, and what the page to browse shows of them."""
+"""Figure, table and browse view of laid strips."""
 
 from ...config.kind import Output
 from ...output.browse import Plot, View
@@ -19,7 +19,7 @@ VIEWS = (
     View(
         "/laying",
         "Laying",
-        "A strip laid on the floor: its outline, the area that it leaves under it, and how far it stretches.",
+        "A strip laid on a trapezoid: outline, area below it, and elongation.",
         (
             Plot("outline of the strip", "strip_y", "strip_x", "definition", along="outline_point", equal=True,
                  beside=REFERENCE_LINES),
@@ -41,7 +41,7 @@ LAYING_COLUMNS = {
     "reference_elongation_known_to_points": ("reference_elongation_error_estimate", 100),
     "penetration_per_mesh_size": ("penetration", 1),
 }
-"""Columns of the table: variable, and the factor on it."""
+"""Columns of the table: variable and factor."""
 
 
 def tables(tree):
@@ -54,8 +54,8 @@ def tables(tree):
     present = laid.area_under_strip.notnull().transpose("loading", "friction", "mesh_size", "definition")
     rows = listed(laid, present, ("loading", "friction", "definition"), LAYING_COLUMNS)
     note = (
-        "Area between strip and floor and elongation of the strip's lower fibre; the reference's is known to so many "
-        "points: twice the spread of three meshes, since the trapezoid's corners catch between a strip's particles, "
-        "where depends on the mesh. The networks' own scatter as much."
+        "Area between strip and floor, and elongation of the strip's lower fibre. The reference elongation has an "
+        "error band of twice the spread of three meshes: corners of the trapezoid catch between particles of the strip "
+        "at places that depend on the mesh. Networks scatter as much."
     )
     return [{"stem": "laying", "title": "Laid strips", "note": note, "rows": rows}]

@@ -9,8 +9,7 @@ r"""Stage `laying`: a strip laid on a trapezoid that stands on a rigid floor, th
             /    trapezoid     \
     -------+--------------------+-------  floor
 
-The trapezoid is deformable. Where it is far stiffer than the strip it counts as rigid and has no unknowns, like the
-floor.
+A trapezoid far stiffer than the strip is rigid: it has no unknowns, like the floor.
 """
 
 import time
@@ -30,7 +29,7 @@ from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
 RIGID_MODULUS_RATIO = 1e4
-"""Ratio of Young's moduli from which the trapezoid counts as rigid."""
+"""Ratio of Young's moduli above which the trapezoid is rigid."""
 
 
 def solve(task):

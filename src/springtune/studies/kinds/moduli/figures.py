@@ -24,7 +24,7 @@ def definitions(tree):
 
 @style.styled
 def plot_moduli(data, ax=None):
-    """Effective Poisson's ratio against the one asked for, a panel a mesh type, each on its finest patch.
+    """Effective over requested Poisson's ratio, one panel per mesh type, on its finest patch.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def plot_moduli(data, ax=None):
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
-        One a mesh type.
+        One per mesh type.
 
     Raises
     ------
@@ -50,17 +50,17 @@ def plot_moduli(data, ax=None):
     >>> [panel.get_title(loc="left") for panel in axes]
     ['structured', 'free']
     >>> axes[0].get_xlabel(), axes[0].get_ylabel()
-    ('asked for', 'effective')
+    ('requested', 'effective')
     """
     moduli = group(data, "moduli")
-    title = "Effective Poisson's ratio against the one asked for; grey: as asked"
+    title = "Effective over requested Poisson's ratio; grey: equal"
     shown = {name: moduli.sel(mesh_type=name) for name in labels_of(moduli.status != 0, "mesh_type")}
     return labels.small_multiples(ax, shown, 2, 1.95, title, _moduli)
 
 
 def _moduli(panel, here):
     """Draw the moduli of one mesh type; return notes, and a message if there are none."""
-    panel.set(xlabel="asked for", ylabel="effective")
+    panel.set(xlabel="requested", ylabel="effective")
     curves, lacking, wanted = {}, [], here.poisson_ratio.values
     for definition in here.definition.values:
         one = here.sel(definition=definition)
@@ -79,12 +79,12 @@ def _moduli(panel, here):
         panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
     said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
     counts = ", ".join(f"{name} ({count})" for name, count in labels.statuses(here.status.values).items())
-    return said, f"No definition has moduli here: {counts or 'none was asked for'}."
+    return said, f"No definition has moduli here: {counts or 'none was requested'}."
 
 
 @style.styled
 def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, materials=None, kinematics=None):
-    """Heat map of the deformation error, definition by load, each on its finest mesh, a panel a material.
+    """Heat map of the deformation error by definition and load on the finest mesh, one panel per material.
 
     Parameters
     ----------
@@ -93,14 +93,14 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     ax : Figure or sequence of Axes, optional
         Where to plot: as many Axes as materials; by default a new figure.
     beam, mesh_type, kinematics : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
+        Labels of the scenes; optional if there is only one.
     materials : sequence of str, optional
         By default three of those with most scenes, from the lowest to the highest Poisson's ratio.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_materials,)
-        One a material.
+        One per material.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         shown[ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}"] = material
     flags = root.status.sel(material=materials).values
     said = [sign_of_errors(root), f"{NO_RESULT}: no result" * bool((flags > 1).any())]
-    said += [f"{NOT_ASKED}: not asked for" * bool((flags == 0).any())]
+    said += [f"{NOT_ASKED}: not requested" * bool((flags == 0).any())]
     said += [f"*: {BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
     title = (
         f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}: deformation error [%] on the finest mesh solved"

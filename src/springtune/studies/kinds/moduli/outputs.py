@@ -1,4 +1,4 @@
-"""Figures and table that compare definitions, and what the page to browse shows of their moduli."""
+"""Figures, table and browse view that compare definitions."""
 
 from ...config.kind import Output
 from ...output.browse import Plot, View
@@ -27,7 +27,7 @@ VIEWS = (
     View(
         "/moduli",
         "Definitions",
-        "Effective moduli of each definition in a patch test: what a network is as a material, whatever its load.",
+        "Effective moduli of each definition in a patch test: the network as a material.",
         (
             Plot("Poisson's ratio, effective over asked", "effective_poisson_ratio", "poisson_ratio", "definition"),
             Plot("errors of Young's modulus on mesh types", "young_modulus_error", "mesh_type", "definition", "map"),

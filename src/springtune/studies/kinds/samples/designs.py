@@ -18,7 +18,7 @@ PARAMETERS = {
     "poisson_ratio": ("", "Poisson's ratio", "1"),
     "force": ("force", "magnitude of the force", "N"),
 }
-"""Parameters of a sampled scene: kind of quantity, what it is, and its unit."""
+"""Parameters of a sampled scene: dimension, meaning and unit."""
 
 SOBOL_INDICES = "sobol-indices"
 """The design for Sobol indices: rows of a base sample differ in one parameter."""
@@ -28,10 +28,10 @@ DESIGNS = (SOBOL_INDICES, "sobol")
 SMALLEST_SIZE = 8
 
 MOST_SALTELLI_SAMPLES = 64
-"""Most base samples of a task of `SOBOL_INDICES`; they have some hundred rows."""
+"""Most base samples of a task for Sobol indices, each of several rows."""
 
 MOST_SOBOL_POINTS = 512
-"""Most base samples of a task of plain Sobol points; each is one row."""
+"""Most points of a task of plain Sobol points."""
 
 
 def blocks(design: str, size: int) -> list[tuple[int, int]]:

@@ -20,7 +20,7 @@ def _parameter_name(name):
 
 @style.styled
 def plot_sobol(data, ax=None, *, load=None):
-    """Sobol indices of a sample, a panel a quantity and definition.
+    """Sobol indices of a sample, one panel per quantity and definition.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def plot_sobol(data, ax=None, *, load=None):
     ax : Figure or sequence of Axes, optional
         Where to plot: as many Axes as there are quantities and definitions; by default a new figure.
     load : str, optional
-        Label of the load. One that is not given must leave no choice.
+        Load; optional if there is only one.
 
     Returns
     -------

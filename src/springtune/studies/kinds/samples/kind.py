@@ -23,7 +23,7 @@ from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, 
 from .outputs import OUTPUTS
 
 SHAPE_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
-"""Keys of each distribution besides its ends."""
+"""Keys of each distribution besides `from` and `to`."""
 
 _NUMBERS: dict[str, Any] = {
     "poisson_ratio": fields.PoissonRatio,
@@ -84,10 +84,10 @@ def _distribution(name: str, section: DistributionConfig) -> dict[str, Any]:
 
 
 MOST_SOLVED_ROWS = 1024
-"""Most rows of a sample whose references are solved one by one where they cannot be interpolated."""
+"""Most rows of a sample whose references are solved one by one if they cannot be interpolated."""
 
 UNIFORM = "uniform"
-"""Definition whose networks give the best uniform stiffness."""
+"""Definition of the best uniform stiffness."""
 
 SOLVE, INTERPOLATE = "studies.kinds.samples.solve", "studies.kinds.samples.interpolate"
 

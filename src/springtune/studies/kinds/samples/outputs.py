@@ -1,4 +1,4 @@
-"""Figures and table of samples, and what the page to browse shows of them."""
+"""Figures, table and browse views of samples."""
 
 from ...config.kind import Output, stem
 from ...output.browse import Plot, View
@@ -9,13 +9,13 @@ QUANTITIES = {
     "deformation_error": "deformation error",
     "best_stiffness": "uniform stiffness without an error",
 }
-"""Quantities that have indices."""
+"""Quantities with Sobol indices."""
 
 
 def _lack(study):
     sample = study.parts["samples"]
     if sample and sample.design != SOBOL_INDICES:
-        return f"shows Sobol indices, which a design '{sample.design}' has not; give design: {SOBOL_INDICES}"
+        return f"shows Sobol indices, which the design '{sample.design}' lacks; give design: {SOBOL_INDICES}"
     return ""
 
 
@@ -42,7 +42,7 @@ VIEWS = (
     View(
         "/samples",
         "Samples",
-        "Scenes whose parameters are drawn from distributions: a point each.",
+        "Scenes with random parameters, one point per scene.",
         (
             *(
                 Plot(f"error by {title}", "deformation_error", x, "definition", "points", along="sample")
@@ -57,7 +57,7 @@ VIEWS = (
     View(
         "/sobol",
         "What matters",
-        "Sobol indices: shares of a quantity's variance by each parameter alone, and in all that it takes part in.",
+        "Sobol indices: share of a quantity's variance by each parameter alone, and with all its interactions.",
         (
             Plot("total order", "total_order", "parameter", "definition", "points", selection=ERROR_SELECTION),
             Plot("first order", "first_order", "parameter", "definition", "points", selection=ERROR_SELECTION),

@@ -21,13 +21,13 @@ from ...runs import store
 from .designs import draw
 
 DRAWN = "drawn"
-"""Key of the parameters among the results of a task."""
+"""Key of the drawn parameters among the results of a task."""
 
 TASKS_TOGETHER = 32
-"""Tasks whose meshes are sorted together; among more tasks more meshes share cells."""
+"""Tasks whose meshes are sorted together, so that more of them share a pattern."""
 
 SCALING_TOLERANCE = 1e-7
-"""Largest relative difference of a scaled result from a solved one: rounding."""
+"""Largest relative difference between a scaled and a solved result, for rounding."""
 
 
 def run(content, attempts):

@@ -19,7 +19,7 @@ EXPERIMENTS = {
 }
 
 DEFINITION_FREE = ("maps", "drift", "rest", "contrast", "sizes")
-"""Experiments about schemes and numbers, not definitions: the first definition of a study stands for all."""
+"""Experiments on schemes and numbers, which use only the first definition of a study."""
 
 AXES = {
     "integrator": INTEGRATORS,

@@ -10,14 +10,14 @@ from ...output.dataset import STATUS
 from ...output.selection import group, labels_of
 
 BEHAVIOUR_COLOURS = {"stable": "#f4f4f4", "decaying": "#b5cfe3", "growing": "#d07a1f", "NaN": "#4a0d1a"}
-"""Darker from one to the next, in the order of the flags."""
+"""Colours of the flags, from light to dark."""
 
 STATUS_COLOURS = ("white", "#dce9f2", "#a9a9a9", "#4a0d1a", "#e0a458", "#5a5a5a")
-"""Of the flags of a status."""
+"""Colours of the flags of a status."""
 
 SCHEMES = {"central-difference-lagged": "Central, damping lags"}
 STRAIN_LOADS = {"axial": "Force on the end", "follower-pressure": "Pressure that follows a long face"}
-"""Titles of panels, where they are not the name."""
+"""Titles of panels that differ from the label."""
 
 
 def stability(tree):
@@ -39,7 +39,7 @@ def _experiment(data, name):
 
 @style.styled
 def plot_stability_maps(data, ax=None):
-    """What noise becomes over step and damping, a panel an integrator.
+    """Behaviour of noise by time step and damping, one panel per integrator.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ def plot_stability_maps(data, ax=None):
     Returns
     -------
     ndarray of matplotlib.axes.Axes
-        One an integrator.
+        One per integrator.
 
     Raises
     ------
     ValueError
-        If the dataset has not the experiment, or ``ax`` has another number of Axes.
+        If the dataset lacks the experiment, or ``ax`` has another number of Axes.
 
     Examples
     --------
@@ -86,14 +86,14 @@ def plot_stability_maps(data, ax=None):
 
     shown = {SCHEMES.get(name, name.replace("-", " ").capitalize().replace("euler", "Euler")): name
              for name in data.integrator.values}  # fmt: skip
-    said = "Damping ratio of the highest mode, damping in proportion to mass; line: predicted limit"
-    title, key = "What noise becomes over step and damping", labels.swatches(BEHAVIOUR_COLOURS)
+    said = "Damping ratio of the highest mode, mass-proportional damping; line: predicted limit"
+    title, key = "Behaviour of noise by time step and damping", labels.swatches(BEHAVIOUR_COLOURS)
     return labels.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, said=said, key=key)
 
 
 @style.styled
 def plot_stability_strains(data, ax=None):
-    """What becomes of large strains: a panel a load, a row a definition.
+    """Status of equilibria at large strain, one panel per load and one row per definition.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def plot_stability_strains(data, ax=None):
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_loads,)
-        One a load.
+        One per load.
 
     Raises
     ------
     ValueError
-        If the dataset has not the experiment, or ``ax`` has another number of Axes.
+        If the dataset lacks the experiment, or ``ax`` has another number of Axes.
 
     Examples
     --------
@@ -150,4 +150,4 @@ def plot_stability_strains(data, ax=None):
     said = "number: negative pivots; %: share of the load that is reached; f: flutter; path: unstable on the way"
     shown = {STRAIN_LOADS.get(load, load): load for load in data.strain_load.values}
     height = 0.6 + 0.19 * max(len(names), 2)
-    return labels.small_multiples(ax, shown, 1, height, "What becomes of large strains", draw, said=said, key=key)
+    return labels.small_multiples(ax, shown, 1, height, "Equilibria at large strain", draw, said=said, key=key)

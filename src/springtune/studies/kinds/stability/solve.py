@@ -1,7 +1,6 @@
 """Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset.
 
-Each takes a `Setup` and yields rows of labels, values of `AXES` and mesh sizes, and results by the names of `VARIABLES`
-in `kind`.
+Each experiment takes a `Setup` and yields rows: labels of `AXES` and mesh sizes, and results by variable of the group.
 """
 
 import time
@@ -311,8 +310,8 @@ def slivers(setup):
 
 
 MOST_ROUNDING_LOSS = 1e-2
-"""Largest share of the digits that rounding may take from a factor: beyond, another solver or processor may leave none,
-neither of the estimate. The condition of a sheet's network is about its number of particles times the contrast."""
+"""Largest share of digits that rounding may take from a factor; above it results depend on solver and processor.
+The condition number of a network is about its number of particles times the contrast."""
 
 
 def contrast(setup):
