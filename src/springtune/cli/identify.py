@@ -48,7 +48,7 @@ def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **option
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
-    """Keys of each test of a file, with paths from here: one of a CSV file, those of the list in a YAML file."""
+    """Options of each test of a file: one test of a CSV file, the list in a YAML file."""
     from yaml import YAMLError, safe_load
 
     from ..safe_io.inputs import LARGEST_CSV, read
@@ -89,7 +89,7 @@ def _test(
 
 
 def _materials(found: "Identified") -> str:
-    """Materials that were found, as a section of a study."""
+    """Identified materials as a section of a study."""
     from yaml import safe_dump
 
     texts = [round(one, 6) if name[:2] == "nu" else f"{one:.6g} Pa" for name, one in found.values.items()]

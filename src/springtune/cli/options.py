@@ -63,16 +63,16 @@ EXCLUDED_OPTIONS = {
     "material": ("young", "poisson"),
     "error": ("size", "engine"),
 }
-"""Options that another one stands in for: it has, or finds, what they say."""
+"""Options that another one replaces."""
 
 REQUIRED_OPTIONS = {"scale": ("study", "engine"), "force": ("load", "engine")} | dict.fromkeys(
     ("dt", "substeps", "iterations", "precision", "definition"), ("engine",)
 )
-"""Options that mean nothing without others, where a command has these."""
+"""Options that need others, if a command has these."""
 
 
 def check_option_pairs() -> None:
-    """Refuse options of a call that leave each other no meaning."""
+    """Refuse options that exclude or need other options."""
     context = click.get_current_context()
     known = {one.name or "": one.opts[0] for one in context.command.params}
     given = [name for name in known if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
@@ -123,7 +123,7 @@ def read_material(given: Mapping[str, Any]) -> "Material":
 
 
 def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
-    """Study, its shapes, and the shape of a text such as ``config/shapes.yaml:cook``."""
+    """Study, its shapes, and the shape of an option such as ``config/shapes.yaml:cook``."""
     from ..problem.quantities import nearest
     from ..studies.kinds import load_study
 
@@ -173,7 +173,7 @@ class BodyOptions:
 
 
 def read_body(given: Mapping[str, Any], load: str | None, sized: bool = True) -> BodyOptions:
-    """Body, material, load and mesh of options; `sized`: a mesh that is made needs a size."""
+    """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size."""
     return (_read_shape_options if given["study"] else _read_beam_options)(given, load, sized)
 
 
@@ -249,7 +249,7 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
 
 
 def _shape_mesh(shape: "Shape", refined: Mapping[str, float], _: str, size: float | None) -> "GroupedMesh":
-    """Mesh, refined by shares of its size as the study says."""
+    """Make the mesh of a shape, refined as in its study."""
     from ..mesh.formats import read_shape  # here, since studies are read without scipy
     from ..mesh.outlines import mesh_shape
 

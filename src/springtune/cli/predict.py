@@ -286,7 +286,7 @@ def _net(
     force: str | None = None,
     scale: float = 1.0,
 ) -> "SpringNet":
-    """Springs of a mesh, under a load if there is one; `scale` [1] is a factor on that of a shape."""
+    """Springs of a mesh, with a load if given; `scale` [1] multiplies the load of a shape."""
     from ..handover.net import SpringNet
     from ..mechanics.statics import SingularError
     from ..scene.single import Scene

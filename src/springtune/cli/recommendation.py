@@ -35,7 +35,7 @@ class Subject(NamedTuple):
     of_beam: bool
 
     def meaning(self, solved: str) -> list[str]:
-        """Lines on what errors mean, of networks that were solved in some way."""
+        """Lines that define the errors."""
         what = "the displacement of the loaded side" if self.of_beam else "each quantity"
         found = [self.known[name].error_estimate for name in self.compared]
         moved = {name: value for name, (value, kind) in self.compared.items() if kind == "displacement"}
@@ -103,13 +103,13 @@ def prediction_text(subject: Subject, mesh_name: str, counts: str, choices: "Seq
 
 
 def recommended(choices: "Sequence[Choice]") -> "tuple[Choice | None, Choice | None]":
-    """The best choice, and the best of springs alone; None if there is none."""
+    """Best choice, and best choice with springs alone, or None."""
     solved = [choice for choice in choices if choice.worst < math.inf]
     return next(iter(solved), None), next((choice for choice in solved if not choice.energies), None)
 
 
 def _worst(subject: Subject, choice: "Choice") -> str:
-    """Largest error of a choice, its load or quantity, and what its sign means."""
+    """Text on the largest error of a choice: its load or quantity, too soft or too stiff."""
     bounds = [(error, name) for name, error in choice.errors.items() if error == error]
     worst, name = max(bounds, key=lambda one: abs(one[0]))
     words = [name, sign_word(worst, *subject.compared[name])]
@@ -168,7 +168,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
-    """Reason why no mesh was found, and the nearest one."""
+    """Text on why no mesh keeps the error, with the nearest mesh."""
     from ..prediction.search import tried_names
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]

@@ -104,7 +104,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
 
 
 def set_cache() -> None:
-    """Give Snakemake a cache folder here, where that of the user cannot be written."""
+    """Set a cache folder here for Snakemake if the user's cannot be written."""
     usual = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
     try:
         usual.mkdir(parents=True, exist_ok=True)
@@ -131,7 +131,7 @@ def _computes(options: list[str]) -> bool:
 
 
 OPTION_VALUE_COUNTS = {"--cores": 1, "-c": 1, "--jobs": 1, "-j": 1, "--quiet": 0, "-q": 0, "--keep-going": 0, "-k": 0}
-"""Options that do not change what a run makes, with their numbers of values."""
+"""Number of values of the options that do not change the products of a run."""
 
 
 def _asks_for_all(options: list[str]) -> bool:

@@ -40,7 +40,7 @@ ANOTHER = "take another definition, or give each a grid of its own"
 def check_known(
     problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str | None = ""
 ) -> None:
-    """Check that a name is known; a study declares it in a section of its kind, in another one, or nowhere (None)."""
+    """Check that a name is known; `section` may declare it, by default that of its kind, or none (None)."""
     if name not in names:
         declared = "" if section is None else f"; or declare it under {section or f'{what}s'}"
         problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}{declared}")
@@ -79,12 +79,12 @@ def mesh_type_names(config: StudyConfig) -> list[str]:
 
 
 def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
-    """Rows of stated stiffnesses; empty if the study states none."""
+    """Rows of stated stiffnesses, if any."""
     return config.definitions.paper.stiffness if config.definitions.paper else []
 
 
 def check_names(config: StudyConfig, problems: Problems) -> None:
-    """Check what declared sections are used for."""
+    """Check the materials and forces of grids, and duplicates of stated stiffnesses."""
     for name, grid in config.grids.items():
         path = ("grids", name)
         for material in grid.material:
@@ -235,7 +235,7 @@ def check_able(
 
 
 def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Problems) -> None:
-    """Check that definitions fit the cells and loads of their grids, and that the study states what they need."""
+    """Check that definitions fit the cells and loads of their grids, and have the sections they need."""
     stated = {(row.mesh_type, row.material): (number, row.value) for number, row in enumerate(stated_rows(config))}
     for grid in grids:
         path = ("grids", grid.name, "definition")

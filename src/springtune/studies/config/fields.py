@@ -1,4 +1,4 @@
-"""Types of the values of a study; the title of each is what to give, in words."""
+"""Types of the values of a study; messages tell users to give the title of a type."""
 
 import math
 from collections.abc import Collection
@@ -47,7 +47,7 @@ Notes = tuple[Any, ...]
 
 
 class Section(BaseModel):
-    """A mapping of known keys in a study; the text below a key is its meaning in the manual."""
+    """A mapping of known keys in a study; the docstring of a key is its meaning in the manual."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, use_attribute_docstrings=True)
 
@@ -219,7 +219,7 @@ def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
 
 
 def _read_range(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
-    """Numbers of a list, or of a range such as ``{from: 1 mm, to: 5 mm, points: 9}``."""
+    """Expand a range such as ``{from: 1 mm, to: 5 mm, points: 9}`` to numbers; other values stay."""
     if not isinstance(value, dict) or RANGE_KEYS.isdisjoint(value):
         return handler(value)
     ends = Range.model_validate(value)
@@ -267,7 +267,7 @@ BeamForces = Annotated[
 
 
 def _check_names(sections: dict[str, Item]) -> dict[str, Item]:
-    """Refuse names that cannot be those of different files."""
+    """Refuse names that are no file names, or differ in case only."""
     seen: dict[str, str] = {}
     for name in sections:
         if not NAME.fullmatch(name):

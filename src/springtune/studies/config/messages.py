@@ -90,12 +90,12 @@ class Problems:
 
 
 def refuse(message: str, *path: Key) -> PydanticCustomError:
-    """Create the error of a validator; ``{value}`` in the message stands for what the file has at the path."""
+    """Create the error of a validator; ``{value}`` in the message stands for the value at the path."""
     return PydanticCustomError("study", "{message}", {"message": message, "path": path})
 
 
 def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
-    """Return the steps of a path that a content has, and the value there: a single value has no items.
+    """Return the part of a path that exists in a content, and the value there; a single value has no items.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
 
 
 def words(annotation: Any) -> str:
-    """What to give for a field or type: the title that it has, else in words."""
+    """Words for a value of a field or type: its title, or a description."""
     if isinstance(annotation, FieldInfo):
         return annotation.title or words(annotation.annotation)
     origin, (inside, *notes) = get_origin(annotation), get_args(annotation) or (None,)
@@ -153,7 +153,7 @@ def _branches(annotation: Any) -> Iterator[Any]:
 
 
 def _inside(annotation: Any, path: Sequence[Key]) -> Any:
-    """Field or type at a path inside a type; None if there is none."""
+    """Field or type at a path inside a type, or None."""
     if not path:
         return annotation
     for one in _branches(annotation):
@@ -177,11 +177,11 @@ def _keys(annotation: Any) -> dict[Key, FieldInfo]:
 WHY = {"int_parsing": "is not a whole number"}
 WHY |= dict.fromkeys(("float_parsing", "decimal_parsing"), "is not a number")
 WHY |= dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal", "finite_number"), "is out of range")
-"""What is wrong with a value, by the type of pydantic's error."""
+"""Fault of a value, by the type of pydantic's error."""
 
 
 def _message(model: Any, details: Any, path: tuple[Key, ...], value: Any) -> str:
-    """Message of an error of pydantic about the value at a path: the value, what is wrong with it, and the remedy."""
+    """Message of an error of pydantic about the value at a path: value, fault and remedy."""
     field, above = _inside(model, path), _keys(_inside(model, path[:-1]))
     if details["type"] == "extra_forbidden":
         return f"unknown key {show(path[-1])}; {nearest(str(path[-1]), map(str, above))}"

@@ -20,7 +20,7 @@ FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 """Reference of sheets at finite strain for networks with nonlinear kinematics."""
 
 STRAINED_REFERENCE = "neo-hooke-plane-strain"
-"""The same of materials in plane strain; of others to see what the plane changes."""
+"""Reference in plane strain; also for materials in plane stress, to compare."""
 
 TESTED_REFERENCE = "yeoh-plane-stress"
 """The same for materials with a uniaxial test, using the fitted law."""
@@ -166,7 +166,7 @@ class Study:
 
     @property
     def shapes(self) -> Any:
-        """What grids ask for of shapes, `springtune.studies.kinds.bodies.shape_expand.Shapes`; None without any."""
+        """Shapes of the study, `springtune.studies.kinds.bodies.shape_expand.Shapes`, or None."""
         return self.parts["bodies"]["shapes"] if self.parts["bodies"] else None
 
     def material(self, name: str) -> AnyMaterial:

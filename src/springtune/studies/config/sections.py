@@ -381,7 +381,7 @@ class StudyConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _check_sections(cls, value: Any) -> Any:
-        """Refuse a study of no grids nor a section that may stand alone, and one that lacks what these need."""
+        """Refuse a study without grids or a section that may replace them, or without what these need."""
         if not isinstance(value, dict):
             return value
         ways = {"grids": GRIDS_NEED} | cls.alone

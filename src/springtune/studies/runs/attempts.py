@@ -87,7 +87,7 @@ def do_tasks(
 
 
 class Attempts:
-    """Attempts at the tasks of a job: how many were made, and errors of a broken program."""
+    """Attempts at the tasks of a job: number of computed ones, and errors of a broken program."""
 
     def __init__(self, lost: Mapping[str, str], under_way: int | None = None) -> None:
         self.lost, self.under_way = lost, under_way

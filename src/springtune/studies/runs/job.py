@@ -20,7 +20,7 @@ from .store import DamagedError
 
 def main(tasks: str, record: str, digest: str, study: str) -> None:
     """Do the job of a note, and write its record."""
-    warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
+    warnings.simplefilter("ignore", AssumptionWarning)  # reading the study has warned
     note = _note(tasks, digest)
     if not note:
         _plan(study, Path(tasks).parents[1])

@@ -108,7 +108,7 @@ def imports_graph() -> "ImportGraph":
 
 @cache
 def closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
-    """Closure of modules of this package, without some modules and what only these import."""
+    """Closure of modules of this package, except some modules and their own imports."""
     graph, left_out = imports_graph(), {full_name(name) for name in without}
     found, waiting = set[str](), {full_name(name) for name in names}
     while waiting:
@@ -138,7 +138,7 @@ def definition_closure(name: str) -> Closure:
 
 
 def mesh_type_closure(name: str) -> Closure:
-    """Closure of a mesh type; for a name of mesh files, that of their reader, with meshio."""
+    """Closure of a mesh type; mesh files have the closure of their reader, with meshio."""
     if name in MESH_TYPES:
         return declared_closure(MESH_TYPES[name])
     return closure("mesh.formats").union(Closure(packages=frozenset({"meshio"})))
@@ -243,7 +243,7 @@ def distribution(package: str) -> str:
 
 @cache
 def version_of(distribution: str) -> str:
-    """Version of a distribution; "none" if it is not installed or not wanted."""
+    """Version of a distribution; "none" if it is absent or disabled."""
     from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
 
     unused = distribution == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"

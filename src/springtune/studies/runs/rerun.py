@@ -72,7 +72,7 @@ def _collect_digest(study: "Study", jobs: dict[str, Job]) -> str:
     """Digest of a study's dataset: of the study's files, the results of its stages and the code."""
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
-    results = sorted({result for job in jobs.values() for result in job.results})  # whatever bundles they are in
+    results = sorted({result for job in jobs.values() for result in job.results})  # in any bundles
     return hash_of(study.name, inputs(study), results, code)
 
 
