@@ -573,7 +573,7 @@ def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
             extra.append(next(words for kind, words in IN_WORDS if isinstance(energy, kind)))
     if len(mesh.quads):
         extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
-    return inside, at_outline, "; ".join(extra) or "nothing"
+    return inside, at_outline, "; ".join(extra) or "none"
 
 
 def _common_value(values: np.ndarray) -> float:
