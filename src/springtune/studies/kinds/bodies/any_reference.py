@@ -1,6 +1,6 @@
-"""References for curves and the dataset, solved by themselves or interpolated.
+"""References for curves and the dataset, solved one by one or interpolated.
 
-The stage `solve` reads those solved by themselves alone: it needs whole fields, and does not depend on finite elements.
+The stage `solve` does not import this module: it needs whole fields, which interpolants have not.
 """
 
 from functools import lru_cache
@@ -12,7 +12,7 @@ from ...runs import store
 from . import stored
 
 ANSWERS = ("displacement", "mean_displacement", "rotation", "strain", "error_estimate")
-"""What an interpolant answers for a unit problem."""
+"""Values of a unit problem that an interpolant returns."""
 
 
 def read(folder, reference, fields=()):
@@ -30,7 +30,7 @@ def read(folder, reference, fields=()):
 
 
 def read_interpolant(folder, key):
-    """Interpolant or None, unit problems solved in its place by key, seconds of one answer, and why there is none."""
+    """Interpolant, or None with the reason last; unit problems solved instead, by key; seconds of one answer."""
     path = Path(folder) / f"{key}.h5"
     state = path.stat() if path.exists() else None
     return _read_interpolant(path, key, (state.st_size, state.st_mtime_ns) if state else None)
@@ -38,7 +38,7 @@ def read_interpolant(folder, key):
 
 @lru_cache(maxsize=8)
 def _read_interpolant(path, key, state):
-    """Cache of `read_interpolant` by the size and time of the file."""
+    """Read an interpolant; cached by the state of its file."""
     arrays = ("aspect_range", "nu_range", "values")
     results = store.read(path, {key} | (store.stored_keys(path) if state else set()), arrays)
     known = results.pop(key)

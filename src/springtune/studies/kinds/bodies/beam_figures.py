@@ -30,16 +30,16 @@ LARGEST_ERROR_SHOWN = 60.0
 
 
 def sensitivity(tree):
-    """Figures of sensitivity curves: stem, function that plots, and selection."""
+    """Stem, plotting function and selection of each figure of sensitivity curves."""
     yield from figures_of("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
 
 
 USUAL_KINEMATICS = "nonlinear"
-"""Kinematics that a figure is of; where a study asks for other ones alone it is of those, and says so."""
+"""Kinematics of figures; a study without them shows its first kinematics, which the title names."""
 
 
 def figures_of(name, plot, status, names):
-    """Figures of each selection that has cells, in the usual kinematics or else the first ones present."""
+    """Stem, plotting function and selection of each figure with cells, in the usual or else the first kinematics."""
     for stem, selection in distinct(name, names, cells(status != 0, names)).items():
         there = labels_of((status != 0).sel(selection), "kinematics")
         yield stem, plot, selection | {"kinematics": USUAL_KINEMATICS if USUAL_KINEMATICS in there else there[0]}
@@ -151,7 +151,7 @@ LEGEND = {
     "failed": ("gap: failed", {"linestyle": ""}),
     "beyond": (BEYOND_SMALL_STRAIN, {"linestyle": ""}),
 }
-"""What of a sensitivity figure is explained beside its curves, and how it looks."""
+"""Entries in the legend of a sensitivity figure, each shown where it occurs."""
 
 
 def _sensitivity_title(panel, root, selection, swept):
@@ -168,7 +168,7 @@ def _sensitivity_title(panel, root, selection, swept):
 
 
 def _reason_without_curve(curves):
-    """Reason why no curve has an error."""
+    """Reason why no curve of a figure has an error."""
     if 1 in curves.status.values:
         return "solved, but without a reference there is no error"
     messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
@@ -176,7 +176,7 @@ def _reason_without_curve(curves):
 
 
 def swept_words(values):
-    """Shown values of swept parameters in words."""
+    """Values of swept parameters for a title."""
     found = []
     for name, value in values.items():
         ends = list(dict.fromkeys((float(value.min()), float(value.max()))))
@@ -192,7 +192,7 @@ def title_labels(selection, *names):
 
 
 def by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data of a figure with one panel a beam, the beams, and the selection."""
+    """Data, beams and selection of a figure with one panel a beam."""
     if beam is not None:
         choose(root.status != 0, beam=beam)
         root = root.sel(beam=[beam])
@@ -204,11 +204,11 @@ def by_beam(root, beam, mesh_type, material, load, kinematics):
 # -- deformed networks -------------------------------------------------------------------------------------------------
 
 SHOWN_FIRST = ("lattice", "calibrated", "paper")
-"""Definitions whose network is shown before others that are solved."""
+"""Definitions whose deformed network is preferred."""
 
 
 def deformed(tree):
-    """Figures of deformed networks: one for each mesh type, material and load; see `sensitivity`."""
+    """Stem, plotting function and selection of each figure of deformed networks."""
     status = group(tree, "/").status
     status = status.sel(definition=group(tree, "fields").definition.values)
     for stem, plot, selection in figures_of("deformed", plot_deformed, status, SCENE_LABELS):
@@ -301,23 +301,23 @@ def _draw_deformed(panel, part):
 # -- the pressed block -------------------------------------------------------------------------------------------------
 
 ENERGY_DEFINITIONS = ("area", "delingette")
-"""Definitions whose largest error over all loads is shown."""
+"""Definitions whose largest error over all loads is a line in the block's figure."""
 
 FACES_SHOWN_FIRST = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
-"""Definitions whose pressed faces are shown before others."""
+"""Definitions whose pressed faces are drawn first."""
 
 MOST_FACES = 5
 """Networks in the panel of the pressed face."""
 
 
 def _pressing_load(names):
-    """Load whose pressed face is shown: pressure, else the first that presses a face."""
+    """Load of the block's figure: pressure, else the first one on a face."""
     pressed = [name for name in names if name in LOADS and LOADS[name].kind.pressed]
     return "pressure" if "pressure" in pressed or not pressed else pressed[0]
 
 
 def block(tree):
-    """The figure of a pressed block: its last material and beam; its finest structured mesh, or of its first type."""
+    """Stem, plotting function and selection of the block's figure: last material and beam, finest structured mesh."""
     present = group(tree, "/").status != 0
     present = present.sel(load=[_pressing_load(labels_of(present, "load"))])
     types = labels_of(present, "mesh_type")
@@ -418,7 +418,7 @@ def _draw_errors_over_stiffness(panel, curves, root):
 
 
 def _draw_pressed_face(panel, block, root, load):
-    """Draw the pressed face over the reference of its kinematics; returns as `_draw_errors_over_stiffness`."""
+    """Draw the pressed face over the reference of its kinematics; return notes, and the reason if nothing is drawn."""
     x, pressed, said = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")

@@ -8,12 +8,12 @@ from ...runs import store
 
 
 def prepare(file, content):
-    """Folder of the curves."""
+    """Folder of the stored curves."""
     return Path(content["folder"])
 
 
 def solve(task, folder):
-    """Calibrated stiffness of a group of scenes [N/m], or None with the reason."""
+    """Calibrated stiffness [N/m] of a group of scenes, or None with the reason."""
     try:
         return {"stiffness": calibrate(_best_stiffness(folder, member) for member in task["members"])}
     except ValueError as error:
@@ -21,12 +21,12 @@ def solve(task, folder):
 
 
 def failed(task, why):
-    """Result of a group that cannot be calibrated."""
+    """Result of a task that fails."""
     return {"stiffness": None, "message": why}
 
 
 def _best_stiffness(folder, member):
-    """Name of a curve, its best stiffness [N/m], and the reason if it has none."""
+    """Name, best stiffness [N/m] and message of a curve."""
     name = member["curve"]
     curve = store.read(folder / f"{member['mesh']}.h5", [name])[name]
     called = f"{member['mesh']} in {member['load']} of {member['force']:g} N"

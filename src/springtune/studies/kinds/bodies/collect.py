@@ -19,24 +19,10 @@ from ...config.model import Reference, keeps_fields
 from ...output.dataset import NO_NODE
 from ...output.selection import OF_FIELDS
 from ...runs import store
-from . import any_reference, plan, stored
+from . import any_reference, plan, stored, variables
 from .outputs import CASE_AXES, MESH_AXES, SHAPES_OUTPUT, pressed
 from .stored import FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
-from .variables import (
-    AT_FINITE_STRAIN,
-    BLOCK,
-    CELL,
-    FIELDS,
-    FINITE_STRAIN,
-    PRINTED_PREFIX,
-    ROOT,
-    SENSITIVITY,
-    SHAPE_FIELDS,
-    SHAPES,
-    fields_of,
-    swept,
-)
 
 FACE_VARIABLES = {
     "displacement": "face_displacement",
@@ -57,7 +43,7 @@ def groups(study, folder):
 
 
 def _with_objection(result, message, why):
-    """Message of a scene; of a solved one with the objection to its reference."""
+    """Message of a scene, with the objection to its reference if the scene is solved."""
     return "; ".join(filter(None, (message, why if result["status"] in (Status.SOLVED, Status.UNSTABLE) else "")))
 
 
@@ -74,7 +60,7 @@ def _fields_of_rows(group, axes, rows):
 
 
 def _mesh_row(mesh):
-    """Values of a mesh at rest; a cell with fewer corners than another one has no node at the last."""
+    """Values of a mesh at rest; triangles among quadrilaterals have no fourth node."""
     cells = np.full((sum(map(len, mesh.cells.values())), max(mesh.cells)), NO_NODE)
     start = 0
     for count, corners in mesh.cells.items():
@@ -91,7 +77,7 @@ def _network_row(arrays):
 
 
 def _outline_row(points, moved):
-    """Values of the outline of a reference at rest, and its displacements."""
+    """Values of the outline of a reference: positions at rest and displacements."""
     values = {"outline_x": points[:, 0], "outline_y": points[:, 1]}
     return values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}
 
@@ -108,25 +94,26 @@ def _beam_groups(study, folder):
     cells, faces, fields = _scene_rows(study, folder, answers)
     meshes = [mesh.labels | stored.read_notes(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes]
     rows = [*planes, *_body_rows(study), *meshes, *_reference_rows(study, answers), *cells, *_printed_rows(study)]
-    data = swept(ROOT, study).of_rows(axes, rows)
+    data = variables.swept(variables.ROOT, study).of_rows(axes, rows)
     _comment(data, answers)
     _write_errors(data.deformation_error, data.displacement, data.reference_displacement)
-    found = {ROOT.name: data}
+    found = {"/": data}
     if study.curves:
-        found[SENSITIVITY.name] = swept(SENSITIVITY, study).of_rows(axes, _curve_rows(study, folder, answers))
+        group = variables.swept(variables.SENSITIVITY, study)
+        found["/sensitivity"] = group.of_rows(axes, _curve_rows(study, folder, answers))
     if study.further_references:
-        rows = [*planes, *_finite_reference_rows(study, folder)]
-        finite = swept(FINITE_STRAIN, study).of_rows(axes | {"reference": study.further_references}, rows)
+        rows, group = [*planes, *_finite_reference_rows(study, folder)], variables.swept(variables.FINITE_STRAIN, study)
+        finite = found["/finite_strain"] = group.of_rows(axes | {"reference": study.further_references}, rows)
         _write_errors(finite.deformation_error, data.displacement, finite.reference_displacement)
-        found[FINITE_STRAIN.name] = finite
     if pressed(study):
-        kinds = _small_strain_name(study), *study.further_references
+        kinds, group = (_small_strain_name(study), *study.further_references), variables.swept(variables.BLOCK, study)
         rows = [*planes, *_face_reference_rows(study, folder, kinds), *faces]
-        axes_of_faces = axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}
-        block = found[BLOCK.name] = swept(BLOCK, study).of_rows(axes_of_faces, rows)
+        own = {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}
+        block = found["/block"] = group.of_rows(axes | own, rows)
         _write_errors(block.face_error, block.face_displacement, block.reference_face_displacement)
     if keeps_fields(study):
-        found[FIELDS.name] = _fields_of_rows(fields_of(study), axes, [*fields, *_rest_rows(study, folder)])
+        rows = [*fields, *_rest_rows(study, folder)]
+        found["/fields"] = _fields_of_rows(variables.fields_of(study), axes, rows)
     return found
 
 
@@ -142,7 +129,7 @@ def _body_rows(study):
 
 
 def _comment(data, answers):
-    """Comment on fits of rubbers, and on references that are interpolated."""
+    """Add comments on fitted rubbers and on interpolated references."""
     rubbers = {one.material.name: one.material for one in answers if isinstance(one.material, Rubber)}
     if rubbers:
         data.material_young_modulus.attrs["comment"] = "; ".join(
@@ -183,7 +170,7 @@ def _reference(study, folder, one, fields=()):
 
 
 def _scene_rows(study, folder, answers):
-    """Rows of the scenes in the root, of pressed faces, and of whole fields; each file is read once."""
+    """Rows of scenes, of pressed faces, and of whole fields; each file is read once."""
     names = "beam", "material", "load", *(one for one in study.swept if one != "stiffness_scale")
     objections = {
         (*study.labels(one).values(), kinematics): objection(result, one.force, kinematics)
@@ -211,12 +198,12 @@ def _scene_rows(study, folder, answers):
 
 
 def _printed_rows(study):
-    """Rows of printed cells that the study asks for."""
+    """Rows of the paper's printed cells that the study has."""
     for cell in study.printed:
-        labels = {name: getattr(cell, name) for name in CELL}
+        labels = {name: getattr(cell, name) for name in variables.CELL}
         if all(label in study.axes[name] for name, label in labels.items()):
-            own = (name for name in ROOT.variables if name.startswith(PRINTED_PREFIX))
-            yield labels | {name: getattr(cell, name.removeprefix(PRINTED_PREFIX)) for name in own}
+            own = (name for name in variables.ROOT.variables if name.startswith(variables.PRINTED_PREFIX))
+            yield labels | {name: getattr(cell, name.removeprefix(variables.PRINTED_PREFIX)) for name in own}
 
 
 def _curve_rows(study, folder, answers):
@@ -242,7 +229,7 @@ def _curve_rows(study, folder, answers):
 
 
 def _small_strain_name(study):
-    """Name of the reference of small strain, by the planes of the materials."""
+    """Name of the small-strain reference, by the planes of the materials."""
     planes = {one.material.plane for one in study.references}
     return "small-strain" if len(planes) > 1 else f"small-strain-plane-{planes.pop()}"
 
@@ -260,7 +247,7 @@ def _finite_reference(folder, one, kind, fields=()):
 
 
 def _write_errors(error, network, reference):
-    """Write deformation errors where both displacements are known: often few cells."""
+    """Write deformation errors where both displacements are known, often in few cells."""
     network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
     there = np.isfinite(network) & np.isfinite(reference)
     error.values[there] = deformation_error(network[there], reference[there])
@@ -291,7 +278,7 @@ def _face_reference_rows(study, folder, kinds):
 
 
 def _rest_rows(study, folder):
-    """Rows of meshes, outlines, and references at the particles of the scenes whose fields are stored."""
+    """Rows of meshes, outlines, and references at particles, for the scenes with stored fields."""
     shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
     meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
     yield from (mesh.labels | _mesh_row(found.mesh) for mesh, found in meshes.items() if found)
@@ -321,21 +308,22 @@ def _shape_groups(study, folder):
     shapes = study.shapes
     answers = {case: _shape_reference(study, folder, *case) for case in shapes.referred}
     rows = [*_quantity_rows(shapes), *_shape_reference_rows(study, answers), *_shape_scene_rows(study, folder, answers)]
-    found = {SHAPES.name: SHAPES.of_rows(study.axes, rows)}
+    data = variables.SHAPES.of_rows(study.axes, rows)
+    found = {"/shapes": data}
     if shapes.finite:
-        found[AT_FINITE_STRAIN.name] = _shapes_at_finite_strain(study, folder, found[SHAPES.name].value)
+        found["/shapes_finite_strain"] = _shapes_at_finite_strain(study, folder, data.value)
     if SHAPES_OUTPUT in study.outputs:
-        found[SHAPE_FIELDS.name] = _shape_fields(study, folder)
+        found["/shape_fields"] = _shape_fields(study, folder)
     return found
 
 
 def _shape_reference(study, folder, *case, arrays=()):
-    """Stored result of a reference: of a shape, material and load, and a law at finite strain."""
+    """Stored reference of a shape, material and load, and a law at finite strain if given."""
     return store.read_one(folder / "references", plan.shape_reference_task(study, *case)["key"], arrays)
 
 
 def _quantity_rows(shapes):
-    """Rows of what quantities are."""
+    """Rows that describe the quantities of shapes."""
     for shape, load in dict.fromkeys((one.shape, one.load) for one in shapes.scenes):
         yield {"shape": shape, "shape_thickness": shapes.shape[shape].thickness}
         for one in shapes.shape[shape].loads[load].quantities:
@@ -345,13 +333,13 @@ def _quantity_rows(shapes):
 
 
 def _reasons(shapes, shape, load, result):
-    """Why a reference, or a quantity of it, is missing, in the names of the study."""
+    """Reasons why a reference or its quantities are missing, with the names of the study."""
     whys = (result["message"], *result.get("lacking", {}).values())
     return [with_names(why, shapes.shape[shape], shapes.shape[shape].loads[load]) for why in whys if why]
 
 
 def _shape_objection(result, kinematics):
-    """Why a reference does not apply to networks of some kinematics."""
+    """Reason why a small-strain reference does not apply, or an empty string."""
     return "" if result["message"] or kinematics == "linear" else beyond_linear(result["rotation"], result["strain"])
 
 
@@ -372,7 +360,7 @@ def _shape_reference_rows(study, answers):
 
 
 def _shapes_at_finite_strain(study, folder, values):
-    """Group of references at finite strain, and the errors of the networks with their law."""
+    """Group of references at finite strain, with the errors of networks of the same law."""
     shapes, rows, references = study.shapes, [], {}
     for shape, material, load, law in shapes.finite:
         result = _shape_reference(study, folder, shape, material, load, law)
@@ -388,11 +376,11 @@ def _shapes_at_finite_strain(study, folder, values):
             error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
             rows.append(labels | {"error": error})
     laws = tuple(dict.fromkeys(law for *_, law in shapes.finite))
-    return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
+    return variables.AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
 def _reference_values(result, quantity):
-    """Value of a quantity in a reference that did not fail, and its error estimate."""
+    """Reference value of a quantity and its error estimate."""
     key = quantity_key(quantity)
     names = {"reference_value": "values", "reference_error_estimate": "error_estimates"}
     return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
@@ -428,7 +416,7 @@ def _rows_of_shape_scene(shapes, one, result, reference):
 
 
 def _error(value, reference):
-    """Signed relative error; NaN where there is nothing to divide by."""
+    """Signed relative error; NaN without a reference or for a reference of zero."""
     return deformation_error(value, reference) if reference else np.nan
 
 
@@ -438,7 +426,7 @@ def _shape_fields(study, folder):
     for one in (one for one in study.shapes.scenes if one in drawn):
         cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
     rows = [{"case": case} | row for case, scenes in cases.items() for row in _case_rows(study, folder, scenes)]
-    return _fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
+    return _fields_of_rows(variables.SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
 
 
 def _case_rows(study, folder, scenes):

@@ -1,4 +1,4 @@
-"""Figures of errors: against mesh size, and against a parameter that a study gives several values."""
+"""Figures of errors against mesh size and against swept parameters."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from .outputs import SCENE_LABELS, SWEPT_SHOWN
 from .tables import like_with_like
 
 MOST_DEFINITIONS_IN_PANEL = 6
-"""Definitions in one panel; more of them take further rows of panels."""
+"""Most definitions in one panel."""
 
 # -- what both have ----------------------------------------------------------------------------------------------------
 
@@ -32,7 +32,7 @@ def _line_styles(root):
 
 
 def _panels_of(words, present):
-    """Definitions of a panel's part, at most `MOST_DEFINITIONS_IN_PANEL`, by its title."""
+    """Definitions of each panel by its title, at most `MOST_DEFINITIONS_IN_PANEL`."""
     asked = labels_of(present, "definition")
     parts = np.array_split(asked, -(-len(asked) // MOST_DEFINITIONS_IN_PANEL))
     several = len(parts) > 1
@@ -41,7 +41,7 @@ def _panels_of(words, present):
 
 
 def _draw_panels(ax, shown, draw, title, sign):
-    """Small multiples of deformation errors: `draw` gets a panel and its part; it returns notes."""
+    """Draw a panel of deformation errors a title; `draw` gets a panel and its part, and returns notes."""
 
     def drawn(panel, part):
         panel.set_ylabel("Deformation error [%]")
@@ -52,9 +52,9 @@ def _draw_panels(ax, shown, draw, title, sign):
 
 
 def _draw_lines(panel, places, here, looks, listed, gaps):
-    """Draw a line a definition, hollow where its error is in doubt; return what a note says.
+    """Draw a line a definition, hollow where its error is doubtful; return notes.
 
-    ``places`` are those along x of each. ``gaps`` says whether cells that were not asked for leave any.
+    ``places`` has the x of each line. With ``gaps``, a line has gaps where no scene was requested.
     """
     said, doubts = [], set()
     for x, (name, look) in zip(places, looks.items()):
@@ -80,7 +80,7 @@ def _draw_lines(panel, places, here, looks, listed, gaps):
 
 
 def size(tree):
-    """Figures of errors against mesh size: one for each mesh type, material and load."""
+    """Stem, plotting function and selection of each figure of errors against mesh size."""
     yield from figures_of("size", plot_size, group(tree, "/").status, SCENE_LABELS)
 
 
@@ -132,7 +132,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
 
 
 def _draw_over_sizes(panel, here, looks):
-    """Draw errors of a beam over mesh size: as `_draw_lines`."""
+    """Draw errors of a beam over mesh size; return notes."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes = 1e3 * here.mesh_size.values
     places = labels.sizes_axis(panel, sizes, len(looks))
@@ -152,11 +152,11 @@ def _draw_over_sizes(panel, here, looks):
 # -- against what is swept ---------------------------------------------------------------------------------------------
 
 LOGARITHMIC_FROM_RATIO = 20.0
-"""Largest value over the smallest from which on an axis is logarithmic."""
+"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
 
 
 def sweep(tree):
-    """Figures of sweeps: one for each parameter that is swept, mesh type, material and load."""
+    """Stem, plotting function and selection of each figure of a swept parameter."""
     present = group(tree, "/").status != 0
     names = [name for name in SWEPT if present.sizes.get(name, 1) > 1]
     for name in names:
@@ -241,7 +241,7 @@ def plot_sweep(
 
 
 def _most_values(present, parameter):
-    """Largest number of values of a parameter that a beam has."""
+    """Largest number of values of a parameter on one beam."""
     return int(present.any([name for name in present.dims if name not in ("beam", parameter)]).sum(parameter).max())
 
 
@@ -267,7 +267,7 @@ def _errors_of_beam(root, name, parameter, mesh_size):
 
 
 def _draw_over_values(panel, here, looks, parameter):
-    """Draw errors over a parameter: as `_draw_lines`."""
+    """Draw errors over a parameter; return notes."""
     here, (words, _, unit) = here.transpose("definition", parameter, ...), SWEPT_SHOWN[parameter]
     x = unit * here[parameter].values
 

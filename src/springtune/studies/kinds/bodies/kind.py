@@ -49,7 +49,7 @@ def _axes(found):
 
 
 def _extents(shape, file):
-    """Extents of a shape in words, or of a mesh file of it."""
+    """Text of the extents of a shape or of its mesh file."""
     if not file:
         return size_text(*np.ptp(shape.extent, axis=0))
     from springtune.mesh.formats import read_shape  # here: few studies have files
@@ -101,7 +101,7 @@ KIND = StudyKind(
 
 
 def summary(study: Study, further: list[list[object]]) -> str:
-    """Summary of a study as text: what it asks for, and what is shared."""
+    """Summary of a study as text: numbers of scenes, meshes, references and curves."""
     title = f"{study.name}: {study.title}"
     if not study.scenes:
         return "\n".join([title, "", aligned(further, left=0, right=(1,))])
@@ -125,7 +125,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
 
 
 def _count_solutions(study: Study) -> str:
-    """Number of finite-element solutions of the references, in words."""
+    """Text of the number of finite-element solutions and interpolants."""
     problems = {
         unit_problem(one.beam, one.material, LOADS[one.load].kind)
         for one in study.references
@@ -138,7 +138,7 @@ def _count_solutions(study: Study) -> str:
 
 
 def _grid_rows(study: Study) -> list[list[object]]:
-    """Rows of a table of grids; new scenes are those that no grid above has."""
+    """Rows of the table of grids; new scenes are in no grid above."""
     rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()
     for grid in study.grids:

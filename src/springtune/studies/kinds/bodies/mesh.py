@@ -1,4 +1,4 @@
-"""Stage `mesh`: one VTU file a mesh of a beam or a shape, with its quality figures and groups in a note beside it."""
+"""Stage `mesh`: a VTU file for each mesh of a beam or shape, with its quality and groups in a note beside it."""
 
 import time
 from functools import partial

@@ -1,4 +1,4 @@
-"""Outputs of scenes, and what the page to browse shows of scenes, curves and references."""
+"""Outputs of beams and shapes, and their views on the page to browse."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from ...config.model import Study
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
-"""Dimensions of which a figure of sensitivity curves shows one label."""
+"""Dimensions with one label in a figure of sensitivity curves."""
 
 SCENE_LABELS = ("mesh_type", "material", "load")
-"""The same for errors against mesh size, and of deformed networks."""
+"""Dimensions with one label in figures of errors and of deformed networks."""
 
 SWEPT_SHOWN = {
     "force": ("Force [N]", "force_N", 1.0),
@@ -26,16 +26,16 @@ SWEPT_SHOWN = {
     "poisson_ratio": ("Poisson's ratio", "poisson_ratio", 1.0),
     "stiffness_scale": ("Factor on the stiffness", "stiffness_scale", 1.0),
 }
-"""What a study sweeps along an axis and in a column, and the unit there over that of the dataset."""
+"""Swept parameters: label of an axis, column of a table, and factor on values of the dataset."""
 
 PLOTS, ERROR_PLOTS = "studies.kinds.bodies.beam_figures", "studies.kinds.bodies.errors"
 
 TABLE_LABELS = ("load", "mesh_type", "material")
-"""What a table of the page is about, as in the paper."""
+"""Dimensions with one label in a table, as in the paper."""
 
 
 def stem(selection: Mapping[str, str], number: int | None = None) -> str:
-    """Stem of a table's file: the paper's number where it has one, else the labels."""
+    """Stem of a table's file, by the paper's number or by its labels."""
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE_LABELS)
 
 
@@ -62,7 +62,7 @@ def _lack_of_pressure(study: "Study") -> str:
 
 
 def _sweeps(study: "Study") -> dict[str, Mapping[str, object]]:
-    """Selections of figures of sweeps by stem: where a parameter has several values."""
+    """Selections of the figures of swept parameters with several values, by stem."""
     found: dict[str, Mapping[str, object]] = {}
     for name in study.swept:
         values: dict[tuple[object, ...], set[object]] = {}
@@ -83,16 +83,16 @@ GENERATED_MESH = "free"
 """Mesh type of shapes with an outline: Delaunay triangles inside it."""
 
 MESH_OF_FILE = "file"
-"""Mesh type of a shape whose mesh is that of its file."""
+"""Mesh type of a shape with mesh files."""
 
 SHAPES_OUTPUT = "shapes"
-"""Output that is made of whole networks."""
+"""Output that needs whole networks."""
 
 OVERVIEW_STEM = "shapes_overview"
 """Stem of the figure of all quantities."""
 
 ERRORS_STEM, DEFORMED_STEM = "shapes_errors", "shapes_deformed"
-"""First parts of the stems of the figures of a shape under a load."""
+"""Begins of the stems of the figures of a shape under a load."""
 
 
 def mesh_name(one: Any) -> str:
@@ -101,7 +101,7 @@ def mesh_name(one: Any) -> str:
 
 
 def shape_figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
-    """Figures by stem: of all quantities, and of each shape and load its errors and its networks."""
+    """Selections by stem: of all quantities, and of the errors and networks of each shape and load."""
     found: dict[str, dict[str, str]] = {OVERVIEW_STEM: {}} if cases else {}
     for name in (ERRORS_STEM, DEFORMED_STEM):
         found |= {figure_stem(name, one): one for one in cases}

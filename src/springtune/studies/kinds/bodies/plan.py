@@ -37,7 +37,7 @@ def particles(area, mesh_size):
 
 
 SEARCHED_DEFINITIONS = {"adjoint", "annealed", "evolved", "best-springs"}
-"""Definitions that search for their springs, which takes about fifty times as long as their scene."""
+"""Definitions with a search, which takes about fifty times as long as the scene."""
 
 
 def expected_seconds(particles, definition=""):
@@ -46,7 +46,7 @@ def expected_seconds(particles, definition=""):
 
 
 def _group_by(items, key):
-    """Items by a key, in order."""
+    """Items grouped by a key, in order."""
     groups = defaultdict(list)
     for item in items:
         groups[key(item)].append(item)
@@ -67,28 +67,27 @@ def curves_by_mesh(study):
 
 @cache_by_study
 def shape_scenes_by_mesh(study):
-    """Scenes of shapes by the stem of their mesh, which differs from those of beams."""
+    """Scenes of shapes by the stem of their mesh."""
     return _group_by(study.shapes.scenes if study.shapes else (), shape_stem)
 
 
 # -- references that are interpolated ----------------------------------------------------------------------------------
 #
-# Where that takes fewer solves. An interpolant has no whole fields; references that need one are solved one by one.
+# An interpolant has no whole fields, so references that need them are solved one by one.
 
 MOST_SOLVED_ALONE = 100
 """Unit problems of one kind of load that are solved one by one, some 3 s; more are interpolated."""
 
 ASPECT_STEPS_IN_DECADE = 10
-"""Ends of ranges of aspect ratios: so many in a decade, each 1.26 times the one before. Aspect ratios that are added to
-a study mostly leave its interpolant as it is."""
+"""Possible ends of a range of aspect ratios in a decade. So new aspect ratios mostly need no new interpolant."""
 
 NU_STEP = 0.05
-"""Distance of the ends of ranges of Poisson's ratio [1]."""
+"""Distance of possible ends of a range of Poisson's ratios [1]."""
 
 
 @cache_by_study
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
-    """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
+    """Interpolants of a study by kind of load: box, and unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
     wanted = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
@@ -136,18 +135,18 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
 
 @cache
 def mesh_key(mesh):
-    """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
+    """Key of the mesh of a beam."""
     code = stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
     return hash_of(parameters(mesh_source(mesh)), code, mesh_type_key(mesh.mesh_type))
 
 
 def parameters(source):
-    """Parameters that results depend on: of a file its ending, which tells the format, and not its folder."""
+    """Parameters of a mesh for keys: of a file the ending, not the folder."""
     return source | {"file": Path(source["file"]).suffix} if "file" in source else source
 
 
 def mesh_source(mesh):
-    """Source of a mesh: its box and mesh size, or its file."""
+    """Parameters to make the mesh of a beam, from a box and mesh size or from a file."""
     source = {"length": mesh.beam.length, "height": mesh.beam.height}
     if mesh.file is None:
         return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
@@ -155,27 +154,27 @@ def mesh_source(mesh):
 
 
 def file_source(file, unit):
-    """Source of a mesh from a file: path, unit and hash of the content."""
+    """Parameters to read a mesh file: path, unit and hash of the content."""
     state = Path(file).stat()
     return {"file": str(file), "unit": unit, "content": _content(file, state.st_size, state.st_mtime_ns)}
 
 
 @lru_cache(maxsize=256)
 def _content(file, size, time):
-    """Hash of a file in its state; each of its scenes asks."""
+    """Hash of a file; cached by its state, since each scene asks."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 @cache
 def stem(mesh):
-    """Stem of a mesh's files; beams of the same extent share it, whatever their labels."""
+    """Stem of a mesh's files; beams of one extent share it."""
     extent = f"{1e3 * mesh.beam.length:.12g}x{1e3 * mesh.beam.height:.12g}"
     own = f"_{mesh_source(mesh)['content'][:8]}" if mesh.file else ""
     return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:.12g}mm{own}"
 
 
 def reference_of(study, beam, material, load):
-    """Reference of a beam, material and load, as `springtune.studies.kinds.bodies.any_reference.read` takes it."""
+    """Argument of `any_reference.read` for the reference of a beam, material and load."""
     solved = solved_reference(beam, material, load)
     name = LOADS[load].kind.name
     box, problems = interpolants(study).get(name, (None, {}))
@@ -193,18 +192,18 @@ NOT_OF_BEAMS = (
     "studies.kinds.bodies.task_values",
     *(f"reference.{name}" for name in ("small_strain", "shapes", "finite_shapes", "finite_strain")),
 )
-"""Modules that scenes import and those of beams do not call: references are tasks of their own."""
+"""Modules that the stage `solve` imports, but scenes of beams do not call."""
 
 
 @cache
 def interpolant_key(kind, box):
-    """Key of an interpolant, which all unit problems in its box share."""
+    """Key of an interpolant."""
     return hash_of("interpolant", kind, box, _reference_code("reference.finite_strain"))
 
 
 @cache
 def solved_reference(beam, material, load):
-    """Reference that is solved by itself, under the key of its unit problem, which scaled beams share."""
+    """Key of the unit problem of a reference, and its scales."""
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
     code = _reference_code("reference.finite_strain", "reference.interpolant")
     key = hash_of(unit_problem_of(beam, material, load), code)
@@ -223,7 +222,7 @@ def unit_problem_of(beam, material, load):
 
 
 def finite_problem(reference, kind):
-    """Values of the task of a reference at finite strain."""
+    """Task of a reference at finite strain."""
     law, _, plane = kind.partition("-plane-")
     load = LOADS[reference.load]
     found = {"law": law, "plane": plane, "load": load.kind.name, "force": reference.force, "follower": load.follower}
@@ -262,7 +261,7 @@ def _scene_tasks(study, mesh, scenes):
 
 
 def _network_task(study, mesh, material, load, definition, kinematics):
-    """Task, and its key, of scenes of a mesh that differ in force or stiffness alone."""
+    """Task and key that scenes of a mesh share which differ in force or stiffness only."""
     task = {
         "material": material_key(material),
         "kind": LOADS[load].kind.name,
@@ -293,7 +292,7 @@ def curve_task(study, curve):
 
 @cache_by_study
 def shown_scenes(study):
-    """Scenes whose whole fields are stored, chosen from the whole study."""
+    """Scenes with stored fields."""
     return shown(study.scenes, study.swept)
 
 
@@ -305,13 +304,13 @@ def calibrating(study):
 
 
 def calibration_name(scene):
-    """Name of the group of curves that calibrates a scene, or that a curve is in."""
+    """Name of the group of curves that calibrates a scene, or that has a curve."""
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
 
 
 @cache_by_study
 def calibrations(study):
-    """Tasks of the groups of scenes that share a calibrated stiffness, all in one job and file."""
+    """Tasks of the calibrated stiffnesses by group, all in one job and file."""
 
     def member(curve):
         place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
@@ -327,10 +326,10 @@ def calibrations(study):
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
 MOST_PARTICLES_DRAWN = 1500
-"""Particles, about, of the largest mesh that is drawn where a coarser one is there."""
+"""Approximate number of particles of the largest mesh that is drawn, if there is a coarser one."""
 
 FILE_PARTICLES = 2000.0
-"""Particles of a mesh from a file, for costs, before it is read."""
+"""Assumed number of particles of a mesh file, for expected seconds."""
 
 WITHOUT_FINITE_STRAIN = ("reference.finite_shapes", "reference.finite_strain")
 
@@ -348,7 +347,7 @@ def shape_particles(study, one):
 
 @cache_by_study
 def drawn_scenes(study):
-    """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
+    """Scenes with drawn networks: of each shape and load the finest mesh that is not too large, and one material."""
     found = set()
     for scenes in _group_by(study.shapes.scenes, attrgetter("shape", "load")).values():
         few = [one for one in scenes if shape_particles(study, one) <= MOST_PARTICLES_DRAWN]
@@ -360,14 +359,14 @@ def drawn_scenes(study):
 
 
 def shape_source(shape, file=""):
-    """Geometry of a shape, or one of its files."""
+    """Parameters of the geometry of a shape, or of one of its files."""
     from .task_values import geometry  # here, as below: studies of beams read this module as well
 
     return geometry(shape) | (file_source(file or shape.file, shape.unit) if shape.file else {})
 
 
 def shape_mesh_source(study, one):
-    """Source of the mesh of a scene."""
+    """Parameters to make the mesh of a shape."""
     source = shape_source(study.shape(one.shape), study.shapes.files[one.shape].get(one.mesh_size, ""))
     if "file" in source:
         return source
@@ -376,18 +375,18 @@ def shape_mesh_source(study, one):
 
 
 def shape_mesh_key(study, one):
-    """Key of the mesh of a scene."""
+    """Key of the mesh of a shape."""
     code = stage_key("studies.kinds.bodies.mesh"), _reader_key(study.shape(one.shape))
     return hash_of(parameters(shape_mesh_source(study, one)), *code)
 
 
 def _reader_key(shape):
-    """Key of the code that reads the mesh file of a shape; empty without a file."""
+    """Key of the code that reads the mesh file of a shape, or an empty string."""
     return mesh_type_key(MESH_OF_FILE) if shape.file else ""
 
 
 def _case_values(study, shape, material, name):
-    """Thickness, load and materials of a scene; densities only under gravity."""
+    """Thickness, load and materials of a scene; with densities only under gravity."""
     from .task_values import load
 
     case, materials = study.shape(shape).loads[name], study.materials_of(shape, material)
@@ -419,7 +418,7 @@ def shape_scene_task(study, one):
 
 
 def _mesh_task(name, source, key, particles, scenes, curves=()):
-    """Task of a mesh with the expected seconds of all that is solved on it."""
+    """Task of a mesh with the expected seconds of its scenes and curves."""
     seconds = (1 + len(curves)) * expected_seconds(particles)
     seconds += sum(expected_seconds(particles, scene.definition) for scene in scenes)
     return Task(source, seconds=seconds, name=name, file=name, key=key)
@@ -436,7 +435,7 @@ def _mesh_tasks(study):
 
 
 def _reference_tasks(study):
-    """Tasks of references, of which those that share elements are in one job, and of interpolants."""
+    """Tasks of references and interpolants; references that share elements are in one job."""
     found = {}
     for one in study.references:
         body = one.beam, one.material, one.load

@@ -1,4 +1,4 @@
-"""Figures of shapes: errors of their quantities over particles and seconds, and their deformed networks."""
+"""Figures of shapes: errors of quantities over particles and seconds, and deformed networks."""
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
@@ -11,13 +11,13 @@ from ...output.selection import cells, choose, group, labels_of
 from .outputs import DEFORMED_STEM, ERRORS_STEM, shape_figures
 
 NETWORKS_IN_ROW = 3
-"""Networks side by side."""
+"""Most networks side by side."""
 
 MOST_NETWORKS = 6
-"""Networks that are drawn where none are chosen."""
+"""Most networks without a choice of definitions."""
 
 SHOWN_FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
-"""Definitions that are drawn before others."""
+"""Definitions that are preferred."""
 
 REFERENCE_COLUMN = "reference to expected"
 """Column of the errors of references."""
@@ -27,7 +27,7 @@ FORCE_COLOURS = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf
 
 
 def shapes(tree):
-    """Figures of shapes: all quantities; and of each shape and load its errors, and its networks."""
+    """Stem, plotting function and selection of each figure of shapes."""
     data = group(tree, "shapes")
     plots = {ERRORS_STEM: plot_shape_errors, DEFORMED_STEM: plot_shape}
     for stem, selection in shape_figures(cells(data.status != 0, ("shape", "load"))).items():
@@ -89,7 +89,7 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
 
 
 def _select_case(data, shape, load, material, kinematics):
-    """The cells of a shape under a load, of one material and kinematics, and their labels."""
+    """Cells of a shape, load, material and kinematics, and their labels."""
     data = group(data, "shapes")
     present = data.status != 0
     chosen = choose(present, shape=shape, load=load)
@@ -105,14 +105,14 @@ def _quantities(cut):
 
 
 def described(cut, name):
-    """What a quantity is, in words."""
+    """Description of a quantity."""
     one = cut.sel(quantity=name)
     kind, component, of = (str(one[f"quantity_{part}"].item()) for part in ("kind", "component", "of"))
     return {"area": "growth of the area", "energy": "strain energy"}.get(kind, f"{kind} {component}, {of}")
 
 
 def _points_of_line(cut, name, definition):
-    """Particles, seconds, sizes of errors [%] and whether each counts, of one line, by particles."""
+    """Points of a line by particles: particles, seconds, sizes of errors [%], and whether each counts."""
     against = _error_variable(cut, name)
     line = cut.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
     seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
@@ -125,13 +125,13 @@ def _points_of_line(cut, name, definition):
 
 
 def _error_variable(cut, name):
-    """Variable that holds the errors of a quantity: those against the reference, if there is one."""
+    """Variable with the errors of a quantity: against the reference if there is one."""
     there = np.isfinite(float(cut.reference_value.sel(quantity=name)))
     return "error" if there else "expected_error"
 
 
 def _draw_errors(panels, cut, name, points):
-    """Draw lines of a quantity over particles and over seconds, with names beside the latter."""
+    """Draw the lines of a quantity over particles and over seconds."""
     one = cut.sel(quantity=name)
     estimate, difference = (
         100 * abs(float(one[f"reference_{error}"])) for error in ("error_estimate", "expected_error")
@@ -163,7 +163,7 @@ def _draw_errors(panels, cut, name, points):
 
 
 def _reason_without_error(cut):
-    """Why there is no error."""
+    """Reason why a quantity has no error."""
     states = drawing.in_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"
@@ -327,7 +327,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
 
 
 def _choose_definitions(cut, asked):
-    """Definitions to draw: solved ones before others, and `SHOWN_FIRST` before the rest."""
+    """Definitions to draw: solved ones first, then `SHOWN_FIRST`, then the rest."""
     solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
     order = sorted(asked, key=lambda name: (not solved[name], name not in SHOWN_FIRST))
     return [name for name in asked if name in order[:MOST_NETWORKS]]

@@ -1,4 +1,4 @@
-"""References of shapes, which the stage `reference` solves: one each shape, material and load, on the shape itself."""
+"""References of shapes for the stage `reference`: one for each shape, material and load."""
 
 from functools import partial
 
@@ -12,11 +12,11 @@ from springtune.reference.shapes import solve_each
 from .task_values import LOAD_NAME, make_shape, materials_of, quantity_key, shape_of, values_by_key
 
 POINTS_ALONG_SIDE = 24
-"""Points along a side of an outline that is drawn."""
+"""Points along a side of a drawn outline."""
 
 
 def solve(task):
-    """Result of a reference: ``shape`` is as `make_shape` takes it, load and materials as `task_values` has them."""
+    """Result of a reference; its ``shape`` is an argument of `make_shape`."""
     solver = None
     if "law" in task:
         from springtune.reference.finite_shapes import solve_finite_shape  # here: most references are of small strain

@@ -1,4 +1,4 @@
-"""Sections of a study that describe shapes, and how their values are read."""
+"""Sections of a study that describe shapes."""
 
 from typing import Annotated, Any, Self
 
@@ -18,11 +18,11 @@ QUANTITIES = {
     "area": ("area", {}),
     "energy": ("energy", {}),
 }
-"""Dimension of each quantity of interest, and the keys for its place with what they name."""
+"""Quantities of interest: dimension, and keys for the place with their meanings."""
 
 
 def pair_field(kind: str) -> Any:
-    """Note of two quantities, along x and along y."""
+    """Field of two quantities, along x and along y."""
     example = units.QUANTITY_KINDS[kind].example
     pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
     return Field(title=f"{kind}s along x and y, such as [{pair}]")
@@ -46,7 +46,7 @@ Anything = Annotated[str, WithJsonSchema({"type": ["string", "number"]}), Field(
 
 
 def _allow_text(*texts: str) -> Any:
-    """Schema of a section that may be given as a text."""
+    """Schema of a section that may also be a text."""
 
     def extend(schema: dict[str, Any]) -> None:
         section = dict(schema)
@@ -219,13 +219,13 @@ class QuantityConfig(Section):
 
     @property
     def component(self) -> str:
-        """Of the displacement, stress or reaction; empty for others."""
+        """Component of the displacement, stress or reaction, or an empty string."""
         found = getattr(self, self.kind)
         return found if isinstance(found, str) else ""
 
     @property
     def expected_value(self) -> float | None:
-        """In SI units."""
+        """Expected value in SI units, or None."""
         dimension = QUANTITIES[self.kind][0]
         return None if self.expected is None else read_quantity(self.expected, dimension, signed=True)
 
@@ -260,7 +260,7 @@ class ShapeFileConfig(Section):
 
 
 def _files(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
-    """List of mesh files; a path alone is a list of one, of no mesh size."""
+    """List of mesh files; a single path gets mesh size 0."""
     if isinstance(value, str):
         return [ShapeFileConfig.model_construct(file=value, mesh_size=0.0)]
     files = handler(value)

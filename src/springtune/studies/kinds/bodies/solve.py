@@ -1,4 +1,4 @@
-"""Stage `solve`: the mass-spring network of every scene of a beam or a shape, all scenes of a mesh together."""
+"""Stage `solve`: the networks of beams and shapes, all scenes of a mesh together."""
 
 import time
 from dataclasses import replace
@@ -27,7 +27,7 @@ parts = stored.parts
 
 
 def tasks(file, content):
-    """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
+    """Tasks of the scenes of a mesh, with calibrated stiffnesses and the keys that depend on them."""
     if not any("calibration" in scene for scene in file["tasks"]):
         return file["tasks"]
     calibration = stored.read_calibration(content["results"])
@@ -38,7 +38,7 @@ def tasks(file, content):
 
 
 def prepare(file, content):
-    """Function that solves the scenes of one mesh, see `springtune.studies.runs.attempts`."""
+    """Function that solves a scene of a mesh."""
     grouped = stored.prepared(content, file)
     if "shape" in file:
         return partial(solve_shape, file["shape"], grouped, {})
@@ -46,7 +46,7 @@ def prepare(file, content):
 
     @cache
     def unit_displacements(key, length):
-        """Displacements for 1 N of a material that moves by 1 m; None where the reference has none."""
+        """Displacements of a unit problem at the particles, or None if the reference has no field."""
         scales = {"key": key, "length": length, "displacement": 1.0}
         found = stored.read_reference(Path(content["results"]) / "references", scales, labels)
         return interpolate(*(found[label] for label in labels), mesh.points) if "x" in found else None
@@ -65,7 +65,7 @@ def failed(task, why):
 
 
 def order(task):
-    """Sort key that puts scenes of one network beside each other."""
+    """Sort key that keeps scenes of one network together."""
     if "materials" in task:
         return task["definition"], hash_of(task["materials"])
     uniform = DEFINITIONS[task["definition"]].uniform
@@ -82,7 +82,7 @@ def solve(task, solve_one):
 
 
 def _solve_problem(about, springs, seconds, task):
-    """Equilibrium of a scene, with what is stored of each scene, and the arrays of one that is drawn."""
+    """Equilibrium of a scene and its stored values, with arrays if the task keeps fields."""
     begin = time.perf_counter()
     found = about.solve(springs)
     result = {
@@ -154,7 +154,7 @@ def _pressed_face(sheet, kind, displacements):
 def solve_shape(described, grouped, sheets, task):
     """Result of a scene of a shape; its ``thickness``, ``load`` and ``materials`` are as `task_values` has them.
 
-    ``sheets`` are those of the mesh by thickness, which scenes add.
+    ``sheets`` caches the mesh by thickness.
     """
     from .task_values import LOAD_NAME, materials_of, shape_of, values_by_key  # here: most studies have no shapes
 

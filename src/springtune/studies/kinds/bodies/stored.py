@@ -1,4 +1,4 @@
-"""Stored meshes, references and scenes, and how they are read.
+"""Reading and writing of stored meshes, references and scenes.
 
 A mesh is a VTU file and a stored result with the checksum of that file, its quality and, of a shape, its groups. A mesh
 that cannot be made has no VTU file, and its result says why.
@@ -39,16 +39,16 @@ def check_unchanged(source: dict[str, Any]) -> None:
 
 
 NOTES_KEY = "notes"
-"""Key of the only result of a mesh's file, which has the key of the mesh itself."""
+"""Key of the only result in a mesh's note."""
 
 
 def files(folder: str | Path, name: str) -> tuple[Path, Path]:
-    """File of a mesh, and that of its notes."""
+    """Files of a mesh and of its notes."""
     return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.h5"
 
 
 def write(folder: str | Path, name: str, key: str, made: GroupedMesh | None, known: dict[str, Any]) -> None:
-    """Store a mesh and its groups; where it cannot be made, only the ``message`` that is known."""
+    """Store a mesh with its groups, or the ``message`` of one that cannot be made."""
     path, notes = files(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
     if made is None:
@@ -73,7 +73,7 @@ def _groups_as_lists(grouped: GroupedMesh) -> dict[str, Any]:
 
 
 def is_stored(folder: str | Path, name: str, key: str) -> bool:
-    """Whether a mesh, or the reason why it cannot be made, is stored."""
+    """Return whether a mesh, or the reason why it cannot be made, is stored."""
     path, notes = files(folder, name)
     if NOTES_KEY not in store.stored_keys(notes):
         return False
@@ -87,7 +87,7 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
 
 
 def prepared(content: dict[str, Any], file: dict[str, Any]) -> GroupedMesh:
-    """Mesh of the tasks of a file."""
+    """Mesh of a job's file; raises RefusedError if it cannot be made."""
     folder = Path(content["results"]) / "meshes"
     if found := read(folder, file["name"]):
         return found
@@ -95,7 +95,7 @@ def prepared(content: dict[str, Any], file: dict[str, Any]) -> GroupedMesh:
 
 
 def read(folder: str | Path, name: str) -> GroupedMesh | None:
-    """Mesh by its name with its groups, of which a beam's has none; None where it could not be made."""
+    """Mesh with its groups by name, or None if it cannot be made."""
     (path, _), notes = files(folder, name), read_notes(folder, name)
     if "message" in notes:
         return None
@@ -139,21 +139,21 @@ def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
 FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
-"""Arrays of all particles and springs, and their types."""
+"""Types of stored arrays of particles and springs."""
 
 
 CALIBRATION_STEM = "calibration"
-"""Stem of the file of calibrated stiffnesses, among the curves."""
+"""Stem of the file of calibrated stiffnesses."""
 
 
 def read_calibration(folder: str | Path) -> dict[str, Any]:
-    """Calibrated stiffnesses of a study [N/m] by key; none where nothing is calibrated."""
+    """Calibrated stiffnesses [N/m] of a study by key."""
     path = Path(folder) / "curves" / f"{CALIBRATION_STEM}.h5"
     return store.read_all(path) if path.exists() else {}
 
 
 def stored_key(scene: dict[str, Any], calibration: dict[str, Any]) -> str:
-    """Key of a scene's result, which depends on the stiffness that calibrates it [N/m], if any."""
+    """Key of a scene's result, which depends on its calibrated stiffness."""
     group = scene.get("calibration")
     return hash_of(scene["key"], calibration[group]["stiffness"]) if group else str(scene["key"])
 
@@ -164,7 +164,7 @@ def fields_key(key: str) -> str:
 
 
 def parts(task: dict[str, Any], result: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Stored parts of a result by key: its numbers and, if they are kept, its fields."""
+    """Stored parts of a result by key: numbers and, if the task keeps them, fields."""
     found = {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
     if task.get("keep_fields"):
         kept = {name: result[name].astype(kind) for name, kind in FIELD_ARRAYS.items() if name in result}

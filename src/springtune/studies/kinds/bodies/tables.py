@@ -27,7 +27,7 @@ def tables(tree):
 
 
 def like_with_like(data):
-    """Root whose nonlinear networks are compared with references at finite strain, where there are any."""
+    """Root with errors of nonlinear networks against references at finite strain, where there are any."""
     root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
     finite = None if finite is None else of_own_law(finite)
@@ -62,7 +62,7 @@ NETWORK_COLUMNS = {
 
 
 def _swept_columns(dimensions):
-    """Swept parameters and their units, by column."""
+    """Swept parameters and their factors, by column."""
     return {column: (name, unit) for name, (_, column, unit) in SWEPT_SHOWN.items() if name in dimensions}
 
 
@@ -92,7 +92,7 @@ STATUS_MARKS = {"solved": "", "unstable": "u", "linear_only": "l"}
 
 
 def _page_cells(rows, definitions, swept, finite):
-    """Cells of the page: a line for each mesh, load and kinematics, two columns a definition; marks, and remarks."""
+    """Cells of the page, a line for each mesh, load and kinematics, two columns a definition; marks and remarks."""
     data = pd.DataFrame(rows)
     length = decimals(data[["network_mm", "reference_mm"]].to_numpy().ravel())
     percent, printed = error_decimals(data["error_percent"]), data["printed_displacement_mm"].notna().any()
@@ -128,7 +128,7 @@ def _page_cells(rows, definitions, swept, finite):
 
 
 def _stiffnesses(rows):
-    """Note on the uniform stiffnesses of a table's networks."""
+    """Text on the uniform stiffnesses of a table's networks."""
     known = pd.DataFrame(rows).groupby("definition", sort=False)["stiffness_N_per_m"].agg(["min", "max"]).dropna()
     ranges = {name: dict.fromkeys(f"{value:.4g}" for value in ends) for name, *ends in known.itertuples()}
     return "; ".join(f"{name}: k = {' to '.join(texts)} N/m" for name, texts in ranges.items())
@@ -163,7 +163,7 @@ def _finite_strain_table(finite, root):
 
 
 def _block_table(block, root):
-    """Middle of the pressed face: linear networks against small strain, others against finite strain if it is there."""
+    """Middle of the pressed face: linear networks against small strain, others against finite strain if known."""
     _, block = own_laws(block)
     order = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
     present = block.face_error.notnull()
@@ -178,7 +178,7 @@ def _block_table(block, root):
 
 
 SHAPE_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "material", "mesh_type")
-"""First columns: what a value is of."""
+"""First columns of the table of shapes."""
 
 SHAPE_ERRORS = ("error", "expected_error", "reference_error_estimate")
 

@@ -40,7 +40,7 @@ def geometry(shape: Shape) -> dict[str, Any]:
 
 
 def load(case: LoadCase) -> dict[str, Any]:
-    """A load case without its name and the names of its quantities."""
+    """Values of a load case, without its name and the names of its quantities."""
     quantities = {quantity_key(one): one for one in case.quantities}
     plain = [
         replace(one, name=f"q{number}", expected=None, source="")
@@ -50,7 +50,7 @@ def load(case: LoadCase) -> dict[str, Any]:
 
 
 _SHAPE_READER = TypeAdapter(Shape)
-"""Reader of what `asdict` makes of a shape."""
+"""Inverse of `asdict` for shapes."""
 
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
@@ -79,7 +79,7 @@ def values_by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
 
 
 def with_names(message: str, shape: Shape, case: LoadCase) -> str:
-    """Message of a task with the names of the study."""
+    """Message of a task with the names that the study gives."""
     names = {f"shape '{SHAPE_NAME}'": f"shape '{shape.name}'", f"load '{LOAD_NAME}'": f"load '{case.name}'"}
     order = sorted({quantity_key(one) for one in case.quantities})
     names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}

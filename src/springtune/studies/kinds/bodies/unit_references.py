@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ...runs.attempts import Attempts
 
 REFERENCE_TOLERANCE = 1e-4
-"""Largest error estimate of an interpolant that stands for references that are solved by themselves [1]: theirs."""
+"""Largest error estimate of an interpolant [1], as of solved references."""
 
 
 def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> None:
@@ -47,7 +47,7 @@ def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> 
 
 
 def _build_interpolant(task: dict[str, Any]) -> dict[str, Any]:
-    """Interpolant within its own tolerance or that of references, else the reason."""
+    """Arrays of an interpolant within its tolerance or that of references, or the reason why there is none."""
     # Here, since few studies need it.
     from springtune.reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError
 
