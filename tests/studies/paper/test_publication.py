@@ -160,7 +160,7 @@ def test_every_number_is_declared_and_used():
     used = called | set(re.findall(r"[a-z]\w+", formulas))
     assert not (set(declared["numbers"]) | set(printed)) - used
     assert set(re.findall(r'#tabular\("([^"]+)"', text)) == set(declared["tables"])
-    assert set(re.findall(r'#drawing\("([^"]+)"', text)) == set(figures)
+    assert set(re.findall(r'"([^"]+)"', " ".join(re.findall(r"#drawing\(([^\[]+)", text)))) == set(figures)
 
 
 # -- figures and the whole ---------------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Build a paper: numbers, tables, figures, then the PDF.
 
-A figure is declared in ``figures.yaml``: it has panels, each a plot function with study and selection, or is drawn by a
-script of ``examples/``.
+``figures.yaml`` declares each figure: a plot function with study and selection, or a script of ``examples/``.
 """
 
 import io
@@ -12,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -22,9 +21,6 @@ from springtune.safe_io import atomic
 from ..output.text import cell_text
 from . import PaperError, check_typst, numbers
 from .numbers import HASH_DIGITS, Dataset, dataset_of, validated
-
-if TYPE_CHECKING:
-    from matplotlib.figure import SubFigure
 
 MAIN = "main.typ"
 
@@ -150,28 +146,17 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
 # -- figures -----------------------------------------------------------------------------------------------------------
 
 
-class Panel(BaseModel):
-    """A panel; `plot` is a public plot function such as ``plot_sensitivity``."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    plot: str
-    study: str
-    at: dict[str, Any] = {}
-
-
 class Drawing(BaseModel):
-    """Declaration of a figure.
+    """Declaration of a figure: a public plot function such as ``plot_sensitivity``, a study and its selection.
 
-    `size` [inch] may be left out for one panel. `example` names a script whose ``main`` leaves one figure open, in
-    place of panels.
+    In their place `example` names a script whose ``main`` leaves one figure open.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    size: tuple[float, float] | None = None
-    columns: int = 1
-    panels: list[Panel] = []
+    plot: str = ""
+    study: str = ""
+    at: dict[str, Any] = {}
     example: str = ""
 
 
@@ -192,27 +177,18 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
 
     from ..output.style import SETTINGS
 
-    def plotted(panel: Panel, part: "SubFigure | None") -> Any:
-        try:
-            return _plot_function(panel.plot, name)(dataset_of(datasets, panel.study, name).tree, part, **panel.at)
-        except (KeyError, TypeError, ValueError) as error:
-            raise PaperError(f"{name}: {panel.plot} of the study '{panel.study}': {error}") from None
-
+    if bool(drawing.example) == bool(drawing.plot):
+        raise PaperError(f"{name}: give a plot, or the example that draws it, one of both")
     # Fonts as publishers take them.
     with matplotlib.rc_context(SETTINGS | {"pdf.fonttype": 42}):
-        if bool(drawing.example) == bool(drawing.panels):
-            raise PaperError(f"{name}: give panels, or the example that draws it, one of both")
         if drawing.example:
             figure = _example_figure(examples / f"{drawing.example}.py", name)
-        elif drawing.size is None and len(drawing.panels) == 1:
-            figure = np.ravel(plotted(drawing.panels[0], None))[0].figure
-        elif drawing.size is None:
-            raise PaperError(f"{name}: several panels; give the figure a size, its width and height in inches")
         else:
-            figure = plt.figure(figsize=drawing.size, layout="constrained")
-            rows = -(-len(drawing.panels) // drawing.columns)
-            for panel, part in zip(drawing.panels, np.ravel(figure.subfigures(rows, drawing.columns, squeeze=False))):
-                plotted(panel, part)
+            plot, tree = _plot_function(drawing.plot, name), dataset_of(datasets, drawing.study, name).tree
+            try:
+                figure = np.ravel(np.asarray(plot(tree, **drawing.at), dtype=object))[0].figure
+            except (KeyError, TypeError, ValueError) as error:
+                raise PaperError(f"{name}: {drawing.plot} of the study '{drawing.study}': {error}") from None
         content = io.BytesIO()
         figure.savefig(content, format="pdf", metadata={"CreationDate": None})
         plt.close(figure)
@@ -244,14 +220,11 @@ def _plot_function(plot: str, name: str) -> Callable[..., object]:
 
 
 def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Describe the source of a figure: selections and hashes of datasets, or the script."""
+    """Describe the source of a figure: selection and hash of the dataset, or the script."""
     if drawing.example:
         return f"none, drawn by examples/{drawing.example}.py"
-    parts = []
-    for panel in drawing.panels:
-        place = ": ".join(filter(None, (panel.study, cell_text(panel.at, {"mesh_size": "m"}))))
-        parts.append(f"{place}, sha256 {dataset_of(datasets, panel.study, name).sha256[:HASH_DIGITS]}")
-    return "; ".join(dict.fromkeys(parts))
+    place = ": ".join(filter(None, (drawing.study, cell_text(drawing.at, {"mesh_size": "m"}))))
+    return f"{place}, sha256 {dataset_of(datasets, drawing.study, name).sha256[:HASH_DIGITS]}"
 
 
 if __name__ == "__main__":
