@@ -111,7 +111,7 @@ def check(seed):
             assert values[place] == pytest.approx(expected, rel=1e-6), place
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(24))
 def test_random_curves_are_of_the_stable_path(seed):
     check(seed)
 

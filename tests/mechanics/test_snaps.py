@@ -34,7 +34,9 @@ def check(arch, shares):
 
 
 @pytest.mark.parametrize(
-    "arch", ARCHES[::14], ids=lambda arch: f"{arch.form}-{arch.ends}-{arch.load}-{arch.definition}"
+    "arch",
+    [arch for arch in ARCHES[::9] if arch.load != "follower-pressure"],
+    ids=lambda arch: f"{arch.form}-{arch.ends}-{arch.load}-{arch.definition}",
 )
 def test_an_arch_beyond_its_limit_load_is_not_solved(arch):
     check(arch, (0.9, 1.05, 5.0))
