@@ -23,7 +23,7 @@ from springtune.linalg.factors import (
 )
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, galerkin
 from springtune.mechanics.continuation import follow
-from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
+from springtune.mechanics.network import PINS_FROM_UNKNOWNS, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.boundary import held, weights
@@ -158,7 +158,7 @@ def test_pins_count_nothing_in_a_singular_matrix():
 def pinned_mesh(mesh_type="structured"):
     """A slender beam, of just so many unknowns that an unstable one gets pins."""
     mesh = MESH_TYPES[mesh_type](0.2, 0.02, 1.2e-3)
-    assert 2 * len(mesh.points) > 1.02 * PINNED
+    assert 2 * len(mesh.points) > 1.02 * PINS_FROM_UNKNOWNS
     return mesh
 
 

@@ -359,7 +359,7 @@ def test_a_standing_wave_on_a_chain_has_its_closed_form(linear, precision, error
 def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, precision):
     motion = beam(mesh_type="free", size=6e-4, linear=linear, mass_damping=20.0)
     step = 0.5 * motion.step_bound("symplectic-euler")
-    assert len(motion.network.mesh.edges) >= 3 * stepping.FEWEST
+    assert len(motion.network.mesh.edges) >= 3 * stepping.LEAST_ENTRIES_A_THREAD
     if damped:
         motion = with_(motion, dampers=0.05 * step * motion.network.stiffness)
     runs = [
@@ -397,7 +397,7 @@ def test_steps_that_follow_each_other_along_a_network_are_those_of_the_whole(lin
 @pytest.mark.parametrize("broken", [0, 1])
 def test_a_thread_that_fails_ends_the_others(broken):
     motion = beam(size=7e-4)
-    assert len(motion.network.mesh.edges) >= 2 * stepping.FEWEST
+    assert len(motion.network.mesh.edges) >= 2 * stepping.LEAST_ENTRIES_A_THREAD
     stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
     stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
     taken = stepper.function

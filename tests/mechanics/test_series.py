@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springtune.mechanics.continuation import follow, smallest_share
-from springtune.mechanics.expansion import ORDER, Expansion
+from springtune.mechanics.expansion import SERIES_ORDER, Expansion
 from springtune.mechanics.network import Network
 from springtune.mechanics.series import StablePath, trace
 from springtune.mechanics.statics import StaticProblem
@@ -176,7 +176,7 @@ def test_series_about_a_loaded_point_meets_that_about_rest(share):
     near, _ = local.measure(weights, targets)
     rest, _ = problem.rest.measure(weights, targets)
     assert near == pytest.approx(rest, rel=1e-9)
-    assert local.order == ORDER
+    assert local.order == SERIES_ORDER
 
 
 class Counted(Network):

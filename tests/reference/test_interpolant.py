@@ -7,8 +7,8 @@ import pytest
 
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.reference.interpolant import (
-    JUDGED_WITHIN,
-    NAMES,
+    ANSWER_NAMES,
+    LIMITS_TOLERANCE,
     TOLERANCE,
     Interpolant,
     NotCertifiedError,
@@ -45,9 +45,9 @@ def errors(found, kind, aspects, ratios):
     """Relative errors of the four answers against solves whose own error is a tenth of what is measured."""
     solved = [solve_unit(aspect, nu, kind, TOLERANCE / 10) for aspect, nu in zip(aspects, ratios)]
     answers = found.evaluate(aspects, ratios)
-    exact = {name: np.array([getattr(one, name) for one in solved]) for name in NAMES}
+    exact = {name: np.array([getattr(one, name) for one in solved]) for name in ANSWER_NAMES}
     scale = exact | {"rotation": exact["rotation"] + exact["strain"]}  # what decides is the larger one
-    return {name: np.abs(getattr(answers, name) - exact[name]) / scale[name] for name in NAMES}
+    return {name: np.abs(getattr(answers, name) - exact[name]) / scale[name] for name in ANSWER_NAMES}
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_errors_are_below_the_estimate(kind):
     difference = errors(found, kind, *points(BOXES[kind], 5, seed=1))
     assert found.error_estimate <= TOLERANCE
     assert max(difference["displacement"].max(), difference["mean_displacement"].max()) < found.error_estimate
-    assert max(difference["rotation"].max(), difference["strain"].max()) < JUDGED_WITHIN
+    assert max(difference["rotation"].max(), difference["strain"].max()) < LIMITS_TOLERANCE
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ from springtune.studies.kinds.bodies.solve import solve as solve_scene
 from springtune.studies.kinds.bodies.solve import solve_beam
 
 PROMISED = 1e-6
-"""Largest error of the displacements of a solved scene, relative: `springtune.mechanics.newton.CORRECTION`."""
+"""Largest error of the displacements of a solved scene, relative: `springtune.mechanics.newton.ERROR_TOLERANCE`."""
 
 MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size from which two modes have merged; a load 1e-6 above the one that merges

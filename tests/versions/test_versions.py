@@ -18,7 +18,7 @@ import pytest
 
 import springtune as st
 from springtune.linalg.factors import CHOLESKY
-from springtune.mechanics.newton import REFINED
+from springtune.mechanics.newton import REFINE_FROM_ERROR
 from springtune.mechanics.series import CURVE_TOLERANCE
 
 from tables import STUDIES
@@ -92,7 +92,7 @@ def assert_as_usual(usual, study, name, python=sys.executable, **environment):
     """Compute the study by a Python, and compare it with the usual one; return the versions of its packages."""
     output = study.with_name(f"{name}.nc")
     assert started(study, output, python, **environment).wait() == 0
-    assert_same(usual, output, REFINED, ROUNDED)
+    assert_same(usual, output, REFINE_FROM_ERROR, ROUNDED)
     return software(output)
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..mesh.formats import LONGEST_SAID
+from ..mesh.formats import MOST_MESSAGE_CHARACTERS
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.escapes import json_line, shown
 from ..scene.single import Scene
@@ -82,7 +82,7 @@ def read(path: str | Path) -> Net:
     try:
         return _checked(json.loads(path.read_text(encoding="utf-8")))
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
+        said = " ".join(str(error).split())[:MOST_MESSAGE_CHARACTERS] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 

@@ -32,16 +32,16 @@ from ..mesh.cells import Mesh
 from ..mesh.sheets import outline_of
 from .network import FollowerPressure, Network
 
-REACH = 2.0
+REACH_SIZES = 2.0
 """Distance up to which corners and edges are watched, over the mesh size."""
 
-STRAIGHT = 1e-6
+STRAIGHT_SINE = 1e-6
 """Sine of the angle below which two edges are taken for one line."""
 
-JOINT = 1e-6
+JOINT_DISTANCE = 1e-6
 """Distance from the joint of two edges at which a corner counts as being there, over the mesh size."""
 
-LONGEST_WAY = 0.5
+LONGEST_STEP = 0.5
 """Longest way of a particle in one Newton step, over the mesh size."""
 
 CONTACT_TOLERANCE = 1e-9
@@ -52,25 +52,25 @@ MAX_CONTACT_STEPS = 40
 SMALLEST_LOAD_STEP = 1e-4
 """Smallest step of the load [1]."""
 
-SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
+DIAGONAL_SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
 """Diagonal shifts tried in turn to make a tangent definite, over its mean diagonal."""
 
-GAP = 1e-9
+DEPTH_TOLERANCE = 1e-9
 """Depth of a corner behind an edge that counts as zero, over the mesh size."""
 
-COMPLIANCE = 1e-11
+CONTACT_COMPLIANCE = 1e-11
 """Compliance added at a contact, over the bodies' own [1]."""
 
-EXCHANGES = 30
+MOST_EXCHANGES = 30
 """How often a set of closed contacts is exchanged before non-negative least squares look for it."""
 
-CHANGES = 4
+MOST_SET_CHANGES = 4
 """How often a Newton step may change which contacts it takes for closed."""
 
 FRICTION_TOLERANCE = 1e-6
 """As `CONTACT_TOLERANCE`, with friction, which lags a step behind."""
 
-SLIP = 1e-3
+FRICTION_SLIP = 1e-3
 """Slip over which friction grows to its limit, over the mesh size; what sticks creeps by about as much a load step."""
 
 
@@ -160,7 +160,7 @@ class Body:
             return self._solver[1]
         scale = float(np.abs(tangent.diagonal()).mean())
         # A little resistance to any motion: free bodies are held by contact alone, which the tangent does not know.
-        for added in SHIFTS:
+        for added in DIAGONAL_SHIFTS:
             matrix = (tangent + added * scale * eye_array(tangent.shape[0], format="csc")).tocsc()
             factor = factorize(matrix, self.network.solver)
             with suppress(SingularError):  # a zero pivot
@@ -206,7 +206,7 @@ class _Sides:
         self.meeting = np.stack([self.normals, self.normals[after]], axis=1)[order]
         both = self.meeting.sum(axis=1)
         self.outward = both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)
-        self.wraps = (self.turn < -STRAIGHT)[order]
+        self.wraps = (self.turn < -STRAIGHT_SINE)[order]
 
 
 @dataclass(frozen=True)
@@ -281,7 +281,7 @@ class Contact:
     def _on_floor(self, owner: int, sides: _Sides) -> Contacts:
         """Corners of a body near the floor."""
         places = self.all[owner].points[sides.corners]
-        near = places[:, 1] <= REACH * self.size
+        near = places[:, 1] <= REACH_SIZES * self.size
         count = int(near.sum())
         return Contacts(
             owners=np.full(count, owner),
@@ -297,7 +297,7 @@ class Contact:
         """Corners of one body near edges of another one."""
         places, (after, before) = self.all[owner].points[own.corners], self.all[target].neighbours
         rows, edge = self._facing(places, own, met, before)
-        ahead, behind = met.turn[edge] < -STRAIGHT, met.turn[before[edge]] < -STRAIGHT
+        ahead, behind = met.turn[edge] < -STRAIGHT_SINE, met.turn[before[edge]] < -STRAIGHT_SINE
         rows = np.concatenate([rows, rows[ahead], rows[behind]])
         edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
         offset = places[rows] - met.start[edge]
@@ -315,7 +315,7 @@ class Contact:
         self, places: np.ndarray, own: _Sides, met: _Sides, before: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Corners near an edge that faces them, by their number in the outline, and the nearest such edge of each."""
-        reach = REACH * self.size
+        reach = REACH_SIZES * self.size
         near = _near(met.start, places, reach)
         shown = np.flatnonzero(_near(places, met.start, reach + met.length))
         if not near.any() or not len(shown):
@@ -326,15 +326,15 @@ class Contact:
         shares = np.einsum("nea,ea->ne", offset, along) / length
         beyond = length * np.maximum(np.maximum(-shares, shares - 1), 0)
         # Of two edges equally near it is the one that faces the corner.
-        facing = JOINT * self.size * (1 + own.outward[near] @ normals.T)
+        facing = JOINT_DISTANCE * self.size * (1 + own.outward[near] @ normals.T)
         nearest = (np.hypot(gaps, beyond) + facing).argmin(axis=1)
         rows, edge = np.flatnonzero(near), shown[nearest]
         gaps, shares, beyond = (part[np.arange(len(rows)), nearest] for part in (gaps, shares, beyond))
         at_end, at_start = met.turn[edge], met.turn[before[edge]]
-        slack = np.where(own.wraps[rows], JOINT * self.size / met.length[edge], -1e-9)
+        slack = np.where(own.wraps[rows], JOINT_DISTANCE * self.size / met.length[edge], -1e-9)
         # Beyond the end of an edge is the next one's place, or nobody's, unless the two make a notch.
-        beside = (shares < np.where(at_start > STRAIGHT, slack, -1e-9)) & (at_start >= -STRAIGHT)
-        beside |= (1 - shares < np.where(at_end > STRAIGHT, slack, -1e-9)) & (at_end >= -STRAIGHT)
+        beside = (shares < np.where(at_start > STRAIGHT_SINE, slack, -1e-9)) & (at_start >= -STRAIGHT_SINE)
+        beside |= (1 - shares < np.where(at_end > STRAIGHT_SINE, slack, -1e-9)) & (at_end >= -STRAIGHT_SINE)
         beside |= np.hypot(gaps, beyond) > reach
         # The far face of a thin body is turned away from the corner.
         opposed = np.einsum("na,nba->nb", met.normals[edge], own.meeting[rows]).min(axis=1) < 0
@@ -402,7 +402,7 @@ class Contact:
             longest = self._step(share, near)
             if longest is None:
                 return None
-            near = longest <= LONGEST_WAY * self.size
+            near = longest <= LONGEST_STEP * self.size
             if longest <= (FRICTION_TOLERANCE if self.friction else CONTACT_TOLERANCE) * self.size:
                 return None if any(body.network.inverted(body.displacements) for body in self.bodies) else count
         return None
@@ -437,7 +437,7 @@ class Contact:
         longest = max(np.abs(part).max() if len(part) else 0.0 for part in steps)
         if not np.isfinite(longest):
             return None
-        shorter = min(1.0, LONGEST_WAY * self.size / longest) if longest > 0 else 1.0
+        shorter = min(1.0, LONGEST_STEP * self.size / longest) if longest > 0 else 1.0
         for body, part in zip(self.bodies, steps):
             body.displacements = body.displacements + body.network.expand(shorter * part)
         self.contacts, self.forces, self.drag = contacts, forces, drag
@@ -465,7 +465,7 @@ class Contact:
             left = gaps + sum(row.T @ part for row, part in zip(rows, steps))
             left[watched] = 0.0
             # The worst first: most others are then kept, too.
-            more = np.flatnonzero(left < min(-GAP * self.size, 0.5 * left.min()))
+            more = np.flatnonzero(left < min(-DEPTH_TOLERANCE * self.size, 0.5 * left.min()))
         return steps, forces
 
     def _closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
@@ -479,7 +479,7 @@ class Contact:
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
         stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)
         sizes = np.cumsum([len(part) for part in missing])
-        for _ in range(CHANGES):
+        for _ in range(MOST_SET_CHANGES):
             conditions = stacked[:, np.flatnonzero(closed)]
             # Two corners may close one gap: a hair of compliance lets them share its force.
             corner = -1e-10 / scale * eye_array(conditions.shape[1], format="csc")
@@ -491,7 +491,7 @@ class Contact:
             forces[closed] = answer[sizes[-1] :]
             left = gaps + stacked.T @ answer[: sizes[-1]]
             pulls = closed & (forces < -1e-9 * np.abs(forces).max(initial=0.0))
-            closes = ~closed & (left < -GAP * self.size)
+            closes = ~closed & (left < -DEPTH_TOLERANCE * self.size)
             if not pulls.any() and not closes.any():
                 return np.split(answer[: sizes[-1]], sizes[:-1]), np.maximum(forces, 0.0)
             closed = (closed & ~pulls) | closes
@@ -541,7 +541,7 @@ class Contact:
         slip = np.zeros(len(forces))
         for row, body, anchor in zip(rows, self.bodies, self._anchor):
             slip += row.T @ body.network.reduce(body.displacements - anchor)
-        width = SLIP * self.size
+        width = FRICTION_SLIP * self.size
         size = np.sqrt(slip**2 + width**2)
         pull = self.friction * forces * slip / size
         stiffness = self.friction * forces * width**2 / size**3 + 1e-3 * self.friction * forces / size
@@ -593,12 +593,12 @@ def _complementary(schur: np.ndarray, opening: np.ndarray, likely: np.ndarray) -
     """
     # Corners of stiff and of soft bodies: each in units of its own compliance.
     own = np.diagonal(schur)
-    unit = np.where(own > COMPLIANCE * own.max(), 1 / np.sqrt(np.maximum(own, 1e-300)), 0.0)
+    unit = np.where(own > CONTACT_COMPLIANCE * own.max(), 1 / np.sqrt(np.maximum(own, 1e-300)), 0.0)
     matrix = unit[:, None] * (0.5 * (schur + schur.T)) * unit
-    matrix[np.diag_indices(len(unit))] += COMPLIANCE
+    matrix[np.diag_indices(len(unit))] += CONTACT_COMPLIANCE
     right = -unit * opening
     closed = likely | (right > 0)
-    for _ in range(EXCHANGES):
+    for _ in range(MOST_EXCHANGES):
         forces = np.zeros(len(unit))
         at = np.flatnonzero(closed)
         try:

@@ -10,34 +10,34 @@ from ..linalg.factors import Factor, SingularError
 from .network import Network
 from .newton import TOLERANCE, LoadedNetwork
 
-BEYOND = 0.25
+INCREMENT_BEYOND = 0.25
 """First increment beyond the last load step, over that step."""
 
-MOST_BEYOND = 24
+MOST_POINTS_BEYOND = 24
 """Most points beyond the last load step in search of a limit point."""
 
-SHORTEST_BEYOND = 1e-6
+LEAST_INCREMENT = 1e-6
 """Shortest increment beyond the last load step, over that step."""
 
-SHORTEST_INVERTED = 1e-3
+LEAST_INCREMENT_INVERTING = 1e-3
 """Shortest increment to a place where a cell inverts, over that step."""
 
-NEARLY = 1e-3
+LIMIT_LOAD_TOLERANCE = 1e-3
 """Relative distance below a limit point, which is only estimated, at which a load may lie above it."""
 
-MOST_BEHIND = 60
+MOST_POINTS_BEHIND = 60
 """Most points behind a limit point in search of a stable one that carries the load."""
 
-FEW, MANY, MOST_OF_POINT = 3, 8, 12
+FEW_STEPS, MANY_STEPS, MOST_STEPS = 3, 8, 12
 """Newton steps of a point: up to which the next increment grows, beyond which it is halved, and most of them."""
 
-NEARLY_STRAIGHT = 0.02
+STRAIGHT_COLUMN_CHANGE = 0.02
 """Largest relative change of a buckling load by the tangent at 0.4 of it, for a nearly straight column."""
 
-INCREMENT, MOST_INCREMENTS = 0.05, 20
+BUCKLING_INCREMENT, MOST_INCREMENTS = 0.05, 20
 """Increment of a path to its buckling load, over the displacements of a straight one there, and how many at most."""
 
-BENDS = "nothing bifurcates: the path bends before; this is the load of the nearly perfect column, about rest"
+BENDING_MESSAGE = "nothing bifurcates: the path bends before; this is the load of the nearly perfect column, about rest"
 """Message for a path without a buckling load."""
 
 
@@ -77,7 +77,7 @@ def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, sca
     """Newton's method in the plane across an increment; None where it does not converge."""
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
-    for step in range(1, MOST_OF_POINT + 1):
+    for step in range(1, MOST_STEPS + 1):
         displacements = problem.moved(at, network.expand(u))
         load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -123,27 +123,27 @@ def continued(
     direction = network.reduce(last - before)
     point = stable = Point(network.reduce(last), load, 0, 0)
     increment = float(np.linalg.norm(direction))
-    length = BEYOND * increment  # near a limit point two paths may be near
+    length = INCREMENT_BEYOND * increment  # near a limit point two paths may be near
     try:
         pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
     except SingularError:
         return Continuation(limit, lost, None)
-    most, growth, way, loads = MOST_BEYOND, 1.5, [0.0], [load]
+    most, growth, way, loads = MOST_POINTS_BEYOND, 1.5, [0.0], [load]
     watched = problem.holds(load, last)  # under a follower pressure the symmetric part may be indefinite all along
     while most:
-        found, length = next_point(problem, target, point, direction, length, SHORTEST_BEYOND * increment)
+        found, length = next_point(problem, target, point, direction, length, LEAST_INCREMENT * increment)
         if found is None:
             break
         if network.inverted(problem.moved(found.load, network.expand(found.u))):
-            growth, length = 1.0, BEYOND * length  # cells that collapse mostly snap just before
-            if length < SHORTEST_INVERTED * increment:
+            growth, length = 1.0, INCREMENT_BEYOND * length  # cells that collapse mostly snap just before
+            if length < LEAST_INCREMENT_INVERTING * increment:
                 return Continuation(limit, lost, None, inverts=True)
             continue
         unstable = found.negative_pivots > pivots
         half = 0.5 * (point.load + found.load)
         middle = problem.moved(half, network.expand(0.5 * (point.u + found.u)))
         if watched and not unstable and point is stable and not problem.holds(half, middle):
-            length *= BEYOND  # it has left the path
+            length *= INCREMENT_BEYOND  # it has left the path
             continue
         most -= 1
         way += [way[-1] + float(np.linalg.norm(found.u - point.u))]
@@ -151,14 +151,16 @@ def continued(
         if np.isnan(limit) and abs(found.load) < abs(point.load) and unstable:
             limit, lost = _top(way, loads), np.nan if lost == point.load else lost
             if not farthest:  # the top is between two points: a load next to it may be carried
-                return Continuation(limit, lost, stable if abs(limit) >= (1 - NEARLY) * abs(target) else None)
-            most, increment = MOST_BEHIND, max(increment, farthest)
+                return Continuation(
+                    limit, lost, stable if abs(limit) >= (1 - LIMIT_LOAD_TOLERANCE) * abs(target) else None
+                )
+            most, increment = MOST_POINTS_BEHIND, max(increment, farthest)
         elif np.isnan(lost) and unstable:
             lost = found.load
         direction, point, stable = found.u - point.u, found, stable if unstable else found
         if abs(point.load) >= abs(target) and not unstable:
             return Continuation(limit, lost, point)
-        if point.steps <= FEW:
+        if point.steps <= FEW_STEPS:
             length = min(growth * length, increment)
     return Continuation(limit, lost, None)
 
@@ -210,7 +212,9 @@ def follow(
         if limit is not None and np.linalg.norm(point.u) >= limit or point.load / s >= 1.0:
             message = ""
             break
-        length = min(length * (1.5 if point.steps <= FEW else 0.5 if point.steps > MANY else 1.0), increment)
+        length = min(
+            length * (1.5 if point.steps <= FEW_STEPS else 0.5 if point.steps > MANY_STEPS else 1.0), increment
+        )
     return Path(
         np.array([point.load for point in points]),
         np.array([problem.moved(point.load, network.expand(point.u)) for point in points]),
@@ -266,8 +270,8 @@ def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
         if _bifurcates(problem, 0.85 * at_rest, first.displacements, critical):
             return Buckling(critical, "")
     low = problem.newton(0.4 * at_rest, 0.4 * at_rest * problem.slope)
-    if low.converged and abs(0.4 * smallest_share(network, None, low.displacements) - 1) <= NEARLY_STRAIGHT:
-        return Buckling(at_rest, BENDS)
+    if low.converged and abs(0.4 * smallest_share(network, None, low.displacements) - 1) <= STRAIGHT_COLUMN_CHANGE:
+        return Buckling(at_rest, BENDING_MESSAGE)
     return Buckling(np.nan, "no buckling load: the path bends far below it")
 
 
@@ -275,18 +279,18 @@ def _bifurcates(problem: LoadedNetwork, load: float, displacements: np.ndarray, 
     """Whether the path on from a stable equilibrium loses its stability at a critical load, still rising."""
     network = problem.network
     direction, last = network.reduce(displacements), Point(network.reduce(displacements), load, 0, 0)
-    length = INCREMENT * float(np.linalg.norm(problem.slope)) * abs(critical)
+    length = BUCKLING_INCREMENT * float(np.linalg.norm(problem.slope)) * abs(critical)
     finest = length / 20  # longer ones may leap from a path that bends to the unstable one beside it
     for _ in range(MOST_INCREMENTS):
         found, _ = next_point(problem, critical, last, direction, length, 1e-6 * length)
-        if found is None or found.load / critical > 1 + 2 * INCREMENT:
+        if found is None or found.load / critical > 1 + 2 * BUCKLING_INCREMENT:
             return False
         if not found.negative_pivots:
             direction, last = found.u - last.u, found
         elif length > finest:
             length *= 0.25
         else:
-            return bool(1 - INCREMENT < last.load / critical < found.load / critical)
+            return bool(1 - BUCKLING_INCREMENT < last.load / critical < found.load / critical)
     return False
 
 

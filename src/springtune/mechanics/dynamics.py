@@ -29,13 +29,13 @@ from .newton import TOLERANCE
 from .statics import StaticProblem
 from .stepping import Moving, make_stepper
 
-CHECK = 64
+STEPS_PER_CHECK = 64
 """Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
 
-MODES, MODE_RESIDUAL = 12, 1e-9
+VECTORS_PER_LOOK, MODE_RESIDUAL = 12, 1e-9
 """Vectors of Lanczos' method between looks at its modes; how far inertia may move a mode from its shape [1]."""
 
-BLOWN_UP = 1e3
+MOST_EXTENTS = 1e3
 """Displacement over the largest of the network's extents beyond which a run has left its model."""
 
 
@@ -163,7 +163,7 @@ class Motion(Moving):
                     vector = vector - (other @ (self.mass * vector)) * other
             size = np.sqrt(vector @ (self.mass * vector))
             last = len(found) == len(load) or size <= 1e-12 * (np.sqrt(answer @ (self.mass * answer)) if found else 0.0)
-            if last or found and len(found) % MODES == 0:
+            if last or found and len(found) % VECTORS_PER_LOOK == 0:
                 basis = np.array(found)
                 squares, shapes = np.linalg.eigh(basis @ (self.stiffness_matrix @ basis.T))
                 shares = (shapes.T @ (basis @ load)) ** 2 / squares
@@ -240,7 +240,7 @@ class Motion(Moving):
         first = np.zeros(shape) if start is None else np.array(start, dtype=float)
         stepper.begin(first.copy(), v)
         let_go = 0.0 if rest is None or self.load.any() else self.energy(first, v)
-        pace = sample or (CHECK if name in EXPLICIT else 1)
+        pace = sample or (STEPS_PER_CHECK if name in EXPLICIT else 1)
         samples: list[list[float]] = []
         done = 0
         with closing(stepper):
@@ -270,7 +270,7 @@ class Motion(Moving):
         """Status and message of a failed run; None if it may go on."""
         size = np.abs(u).max()
         extent = np.ptp(self.network.mesh.points, axis=0).max()
-        if not np.isfinite(size) or size > BLOWN_UP * extent or not np.isfinite(v).all():
+        if not np.isfinite(size) or size > MOST_EXTENTS * extent or not np.isfinite(v).all():
             limit = self.step_limit(integrator)
             why = " though the step is stable about rest; use a smaller step or load"
             if step > limit:
@@ -337,7 +337,7 @@ def _largest(matrix: sparray, start: np.ndarray | None = None) -> tuple[float, n
 
 # -- dynamic relaxation ------------------------------------------------------------------------------------------------
 
-RELAX_CHECK = 40
+STEPS_PER_ESTIMATE = 40
 """Steps between new estimates of the lowest frequency."""
 
 
@@ -362,7 +362,7 @@ def relax(
     v = np.zeros_like(u)
     done, before = 0, None
     while done < max_steps:
-        found = motion.run("central-difference", 1.0, RELAX_CHECK, u, v)
+        found = motion.run("central-difference", 1.0, STEPS_PER_ESTIMATE, u, v)
         done += found.steps
         if found.status == "diverged":
             return replace(found, steps=done, message="dynamic relaxation diverged; use load steps or Newton's method")

@@ -437,7 +437,7 @@ class StableNeoHookeEnergy(_SheetEnergy):
         return half * distortion + 0.5 * bulk * growth**2, half, bulk * growth, none, none, bulk
 
 
-HALVED = np.log(0.5)
+LOG_LEAST_VOLUME = np.log(0.5)
 """Logarithm of the smallest volume with an equilibrium across the sheet in `NeoHookeEnergy`."""
 
 MOST_ITERATIONS = 60
@@ -476,8 +476,8 @@ class NeoHookeEnergy(_SheetEnergy):
             slope = -half * (pull + 2 * np.exp(y) + 4 * np.exp(-2 * y)) / 1.5 - 1.5 * bulk * grown * (2 * grown - 1)
             return off, slope
 
-        low, high = np.full_like(area, HALVED), np.full_like(area, 30.0)
-        v = np.clip(3 * self.shear * area / (2 * self.shear + 1.5 * bulk), 0.9 * HALVED, 1.0)
+        low, high = np.full_like(area, LOG_LEAST_VOLUME), np.full_like(area, 30.0)
+        v = np.clip(3 * self.shear * area / (2 * self.shear + 1.5 * bulk), 0.9 * LOG_LEAST_VOLUME, 1.0)
         for _ in range(MOST_ITERATIONS):
             off, slope = imbalance(v)
             low, high = np.where(off > 0, v, low), np.where(off > 0, high, v)
@@ -487,7 +487,7 @@ class NeoHookeEnergy(_SheetEnergy):
             v = v + step
             if not (np.abs(step) > 1e-15 + 1e-14 * np.abs(v)).any():
                 break
-        return np.where(imbalance(np.full_like(area, HALVED))[0] > 0, v, np.nan)
+        return np.where(imbalance(np.full_like(area, LOG_LEAST_VOLUME))[0] > 0, v, np.nan)
 
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
         area = np.log1p(growth)

@@ -14,10 +14,10 @@ import numpy as np
 from ..linalg.factors import Factor
 from .network import Network
 
-ORDER = 14
+SERIES_ORDER = 14
 """Default order of a series for a whole curve."""
 
-STEP = 1e-3
+STEP_TOLERANCE = 1e-3
 """Difference of two approximants over the way from the point that ends a step along the path."""
 
 
@@ -40,7 +40,7 @@ class Expansion:
         s: float,
         displacements: np.ndarray | None,
         factor: Factor,
-        order: int = ORDER,
+        order: int = SERIES_ORDER,
         turning: bool = False,
         rough: bool = False,
     ) -> None:
@@ -168,8 +168,8 @@ class Expansion:
             shares = self._shares(sigma)
             apart = shares - self._shares(sigma, 1)
             way = np.concatenate([[0.0], shares[1:]])
-            close = apart @ self._products @ apart <= STEP**2 * (way @ self._products @ way)
-            if close and abs(apart @ self.loads) <= STEP * abs(way @ self.loads):
+            close = apart @ self._products @ apart <= STEP_TOLERANCE**2 * (way @ self._products @ way)
+            if close and abs(apart @ self.loads) <= STEP_TOLERANCE * abs(way @ self.loads):
                 break
             sigma *= 0.75
         loads = [sign * (self._shares(part * sigma) @ self.loads) for part in np.linspace(0.0, 1.0, 33)]

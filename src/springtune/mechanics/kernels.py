@@ -23,10 +23,10 @@ from numba.extending import intrinsic
 
 from ..linalg.kernels import compiled
 
-PATIENCE = 1000
+CHECKS_BEFORE_YIELD = 1000
 """Checks of another thread, some microseconds, before a waiting thread yields its core."""
 
-STRIDE = 8
+PROGRESS_STRIDE = 8
 """Array entries between progress counters of threads: a cache line, against false sharing."""
 
 
@@ -80,7 +80,7 @@ def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: 
     looks = 0
     while _told(progress[ahead]) < least:
         looks += 1
-        if looks > PATIENCE:
+        if looks > CHECKS_BEFORE_YIELD:
             if _told(progress[threads]):
                 return False
             _yield()

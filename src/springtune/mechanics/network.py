@@ -21,25 +21,27 @@ from ..mesh.sheets import check_held
 from .energies import Energy
 from .pattern import Pattern
 
-LARGE = 200_000
+MULTIGRID_FROM_UNKNOWNS = 200_000
 """Unknowns above which multigrid replaces SuperLU: as fast there, with a third of the memory."""
 
-LARGEST = 600_000
+NO_CHOLESKY_FROM_UNKNOWNS = 600_000
 """Unknowns above which multigrid also replaces Cholesky: faster there, with half the memory."""
 
-FACTORIZED = 2_500_000
+MOST_CHOLESKY_UNKNOWNS = 2_500_000
 """Unknowns up to which Cholesky (2 kB an unknown) replaces multigrid that does not converge.
 
-Up to `LARGEST` SuperLU does, without CHOLMOD or with an unsymmetric matrix.
+Up to `NO_CHOLESKY_FROM_UNKNOWNS` SuperLU does, without CHOLMOD or with an unsymmetric matrix.
 """
 
-PINNED = 5_000
+PINS_FROM_UNKNOWNS = 5_000
 """Unknowns above which an indefinite matrix gets a Cholesky factor with pins; SuperLU is as fast on smaller ones."""
 
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
     """Return the solver that takes over if conjugate gradients with multigrid do not converge."""
-    first, most = ("Cholesky", FACTORIZED) if symmetric and cholesky else ("SuperLU", LARGEST)
+    first, most = (
+        ("Cholesky", MOST_CHOLESKY_UNKNOWNS) if symmetric and cholesky else ("SuperLU", NO_CHOLESKY_FROM_UNKNOWNS)
+    )
     return first if solver is None and unknowns <= most else None
 
 
@@ -404,7 +406,7 @@ class Network:
         if tried and (pinned := self._pinned(matrix)):
             return pinned
         factor = self._pattern.analysis.factorize(matrix.data)
-        self._indefinite = factor is None and self.unknowns > PINNED
+        self._indefinite = factor is None and self.unknowns > PINS_FROM_UNKNOWNS
         return self._pinned(matrix) if self._indefinite and not tried else factor
 
     def _pinned(self, matrix: csc_array) -> Factor | None:
@@ -416,13 +418,13 @@ class Network:
     def _by_cholesky(self) -> bool:
         """Whether Cholesky's method is tried first."""
         if self.solver is None:
-            return CHOLESKY and self.unknowns <= LARGEST
+            return CHOLESKY and self.unknowns <= NO_CHOLESKY_FROM_UNKNOWNS
         return self.solver == "Cholesky"
 
     @property
     def _by_multigrid(self) -> bool:
         """Whether multigrid solves what is not factorized by Cholesky's method."""
-        return self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE
+        return self.solver == "multigrid" or self.solver is None and self.unknowns > MULTIGRID_FROM_UNKNOWNS
 
     def is_stable(self, displacements: np.ndarray, follower: tuple[float, FollowerPressure] | None = None) -> bool:
         """Return whether the tangent's symmetric part is positive definite; cheaper than a factorization for use."""

@@ -14,20 +14,20 @@ from ..linalg.factors import Factor, SingularError
 from .network import FollowerPressure, Network
 
 TOLERANCE = 1e-10
-"""Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
+"""Residual of an equilibrium over the load [1]; slender beams only reach rounding, see `ERROR_TOLERANCE`."""
 
 MAX_FACTORIZATIONS = 16
 MAX_HALVINGS = 12
-CORRECTION = 1e-6
+ERROR_TOLERANCE = 1e-6
 """Largest estimated error of displacements; a small residual says little with an ill-conditioned stiffness."""
 
-REFINED = 1e-9
+REFINE_FROM_ERROR = 1e-9
 """Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
 
-REPRESENTATION = 4.0
+ROUNDING_FACTOR = 4.0
 """Residual that counts as balance, over that of rounding the displacements."""
 
-WATCHED = 4
+MOST_WATCHED_STEPS = 4
 """Steps in a row that may leave the residual above its minimum: a slender turning beam stretches and releases."""
 
 LONGEST_STEP = 0.5
@@ -36,10 +36,10 @@ LONGEST_STEP = 0.5
 MOST_MODES = 24
 """Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
 
-MERGED = 1e-6
+FLUTTER_SHARE = 1e-6
 """Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
 
-KEEP_TANGENT = 0.03
+KEPT_TANGENT_FACTOR = 0.03
 """Largest factor on the residual in a step for which the tangent is reused."""
 
 
@@ -134,7 +134,7 @@ class LoadedNetwork:
         if self.follower is None or factor is self.network.rest_factor:
             return factor.negative_pivots, False
         modes = self.modes(s, displacements, factor)
-        merged = np.abs(modes.imag) > MERGED * np.abs(modes)
+        merged = np.abs(modes.imag) > FLUTTER_SHARE * np.abs(modes)
         return int((modes.real < 0)[~merged].sum()), bool(merged.any())
 
     def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
@@ -207,8 +207,8 @@ class Newton:
 
     A few steps may leave the residual above its minimum. Then the best iterate is restored and steps are halved until
     the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell, Math. Programming Study
-    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by `KEEP_TANGENT`: a
-    new one costs ten such steps.
+    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by
+    `KEPT_TANGENT_FACTOR`: a new one costs ten such steps.
     """
 
     def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int) -> None:
@@ -246,7 +246,7 @@ class Newton:
         if residual <= TOLERANCE:
             return True
         rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
-        return residual * abs(self.s) * self.problem.load_norm <= REPRESENTATION * norm(rounding)
+        return residual * abs(self.s) * self.problem.load_norm <= ROUNDING_FACTOR * norm(rounding)
 
     def _iterate(self) -> str:
         """Take or reject a step; return why none can be taken, or an empty string."""
@@ -269,13 +269,13 @@ class Newton:
         if self._keep and not lower:  # the tangent is of an earlier iterate
             self._keep = False
             return ""
-        if self._watched and not lower and (there is None or self._since_best == WATCHED):
+        if self._watched and not lower and (there is None or self._since_best == MOST_WATCHED_STEPS):
             self._here, self._keep, self._watched = self._best, False, False
             return ""
         if there is None:
             return "line search found no descent"
         self._steps += 1
-        self._keep = there.residual <= KEEP_TANGENT * self._here.residual
+        self._keep = there.residual <= KEPT_TANGENT_FACTOR * self._here.residual
         self._here = there
         self._best, self._since_best = (there, 0) if lower else (self._best, self._since_best + 1)
         return ""
@@ -300,7 +300,7 @@ class Newton:
         try:
             self._factor = self.problem.factorize_tangent(self.s, here.displacements)
             refined, error = refine(self.network, here, self._factor, partial(self.problem.balance, self.s))
-            if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
+            if refined is not here and self.network.largest_change(refined[0] - here[0]) > ERROR_TOLERANCE:
                 self._factor = None
                 self._factor = self.problem.factorize_tangent(self.s, refined.displacements)
         except SingularError:
@@ -335,7 +335,7 @@ def refine(
 ) -> tuple[Iterate, float]:
     """Take steps with one tangent while each halves the estimated error; return the iterate and that error [1]."""
     error = error_estimate(network, factor, here, linear)
-    while error > REFINED:
+    while error > REFINE_FROM_ERROR:
         displacements = here.displacements + network.expand(factor.solve(here.missing))
         there = Iterate(displacements, *balance(displacements))
         better = error_estimate(network, factor, there, linear)
@@ -347,7 +347,7 @@ def refine(
 
 def uncertainty(error: float) -> str:
     """Return why a solution of this estimated error is refused, or an empty string."""
-    return "" if error <= CORRECTION else f"ill-conditioned: {error:.1e} of the displacements is uncertain"
+    return "" if error <= ERROR_TOLERANCE else f"ill-conditioned: {error:.1e} of the displacements is uncertain"
 
 
 def norm(vector: np.ndarray) -> float:

@@ -12,10 +12,10 @@ from ..linalg.factors import Analysis, nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
 
-DISSECTED = 100_000
+DISSECTION_FROM_UNKNOWNS = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
 
-PIN_PARTICLES = (8, 32)
+PIN_COUNTS = (8, 32)
 """Particles to pin in an indefinite matrix; the second number is tried if the first fails."""
 
 
@@ -83,7 +83,7 @@ class Pattern:
         """Return the pattern of a mesh with the same cells at other points."""
         found = copy(self)
         found.mesh = mesh
-        for name in ("order", "elimination", "pins", *(["analysis"] if self.size > DISSECTED else [])):
+        for name in ("order", "elimination", "pins", *(["analysis"] if self.size > DISSECTION_FROM_UNKNOWNS else [])):
             found.__dict__.pop(name, None)
         return found
 
@@ -101,12 +101,12 @@ class Pattern:
     @cached_property
     def analysis(self) -> Analysis:
         """Symbolic Cholesky factorization; in CHOLMOD's own order for meshes too small for nested dissection."""
-        return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
+        return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTION_FROM_UNKNOWNS else None)
 
     @cached_property
     def pins(self) -> list[np.ndarray]:
         """Unknowns to pin where the matrix is indefinite: those of particles spread over the mesh."""
-        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PIN_PARTICLES)
+        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PIN_COUNTS)
         return [pins[pins >= 0] for pins in chosen]
 
     @cached_property

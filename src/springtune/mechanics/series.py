@@ -15,10 +15,10 @@ from .statics import HIGH_ORDER, StaticProblem
 CURVE_TOLERANCE = 1e-7
 """Largest estimated relative error of a displacement on a sensitivity curve."""
 
-STRETCH = 0.1
+CHECKED_STRETCH = 0.1
 """Largest relative length change of a spring between two checked tangents; stability can vary within 0.25."""
 
-WAY_ORDER = 10
+PATH_ORDER = 10
 """Order of a series along the path."""
 
 MAX_SERIES = 3
@@ -33,10 +33,10 @@ MOST_UNKNOWNS = 4000
 MAX_STEPS = 60
 """Steps along the path beyond the series about rest."""
 
-LIMIT = 1e-3
+LIMIT_LOAD_TOLERANCE = 1e-3
 """Share of the load by which a path may still rise to a limit point when it is abandoned."""
 
-GROWTH = 8
+ERROR_POWER = 8
 """Power of the way along a series with which its error is taken to grow; that of order 10 grows faster."""
 
 MAX_STEP_HALVINGS = 6
@@ -45,7 +45,7 @@ MAX_STEP_HALVINGS = 6
 FEW_FACTORIZATIONS = 5
 """Most factorizations of a solve from a prediction; one or two suffice near the path."""
 
-NEAR = 0.02
+PATH_DISTANCE = 0.02
 """Distance of a spring's vector from its prediction, over its length, beyond which a solve found another path."""
 
 
@@ -78,7 +78,7 @@ class StablePath:
     path is followed in steps: a series predicts a point and a solve corrects it.
 
     Between two stable points of one series the path counts as stable if no spring's length changes by more than
-    `STRETCH`: the lowest eigenvalue would have to pass zero twice. Stability that was lost is not regained.
+    `CHECKED_STRETCH`: the lowest eigenvalue would have to pass zero twice. Stability that was lost is not regained.
 
     Arguments, `values` and `stable` are those of `trace`. `stable_to` is the largest load, without its sign, known to
     be carried [m]; `end` says why the path ends before the last target.
@@ -201,7 +201,7 @@ class StablePath:
     def _bracket(self, last: float, point: _Point, before: np.ndarray | None) -> None:
         """Look at the stability between the point up to which the path is stable and the last of a series."""
         first = self.stable_to
-        steps = 1 + int(self._stretched(point.displacements, 0.0 if before is None else before) / STRETCH)
+        steps = 1 + int(self._stretched(point.displacements, 0.0 if before is None else before) / CHECKED_STRETCH)
         for load in np.linspace(first, last, steps + 1)[1:]:
             if not (point.stable if load == last else self._stable_at(load)):
                 self._unstable_from = load
@@ -307,7 +307,7 @@ class StablePath:
         s = self._sign * load
         value, error = series.value(self.weights, s, farthest)
         sigma = series.parameter(s, farthest)
-        if max(error, missed * (sigma / farthest) ** GROWTH) <= 0.1 * CURVE_TOLERANCE:
+        if max(error, missed * (sigma / farthest) ** ERROR_POWER) <= 0.1 * CURVE_TOLERANCE:
             return value
         return self._solved(s, series.at(sigma)[1])
 
@@ -317,7 +317,11 @@ class StablePath:
         if network.inverted(guess):
             return None, None
         found = self.problem.newton(s, guess, FEW_FACTORIZATIONS)
-        if not found.converged or found.factor is None or network.largest_change(found.displacements - guess) > NEAR:
+        if (
+            not found.converged
+            or found.factor is None
+            or network.largest_change(found.displacements - guess) > PATH_DISTANCE
+        ):
             return None, None
         try:
             return found.displacements, found.factor if found.factor.negative_pivots == 0 else None
@@ -346,10 +350,10 @@ class StablePath:
         if factor is None:
             self.end = "no stable equilibrium found"
             return
-        series = Expansion(self.problem.network, self.problem.load, s, displacements, factor, WAY_ORDER, turning=True)
+        series = Expansion(self.problem.network, self.problem.load, s, displacements, factor, PATH_ORDER, turning=True)
         farthest, turns = series.reach(self._sign)
         most = abs(series.at(farthest)[0])
-        if turns and most - abs(s) <= LIMIT * most and load >= most:
+        if turns and most - abs(s) <= LIMIT_LOAD_TOLERANCE * most and load >= most:
             self.end = "limit point"
             return
         if load < most or not turns:
@@ -357,7 +361,7 @@ class StablePath:
         else:
             farthest *= 0.9
         start = 0.0 if displacements is None else displacements
-        while self._stretched(series.at(farthest)[1], start) > STRETCH:
+        while self._stretched(series.at(farthest)[1], start) > CHECKED_STRETCH:
             farthest *= 0.75
         self._end_step(series, farthest)
 
@@ -375,7 +379,7 @@ class StablePath:
             if displacements is not None:
                 unstable = abs(s)
             farthest *= 0.5
-        if factor is None or unstable <= (1.0 + LIMIT) * self.stable_to:
+        if factor is None or unstable <= (1.0 + LIMIT_LOAD_TOLERANCE) * self.stable_to:
             self.end = "no stable equilibrium found" if unstable == np.inf else "unstable"
         elif len(self._pieces) == MAX_STEPS:
             self.end = "too many steps"

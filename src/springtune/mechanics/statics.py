@@ -18,35 +18,35 @@ from .continuation import continued
 from .expansion import Expansion
 from .newton import Equilibrium, LoadedNetwork, uncertainty
 
-FAR = 0.15
+FAR_STRETCH = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
 
-TURNED = 0.3
+FAR_CHANGE = 0.3
 """Change of a spring's vector over its length above which this applies too."""
 
-UNSNAPPED = 1e-3
+UNSNAPPED_CHANGE = 1e-3
 """Change of a spring's vector over its length below which no path turns back."""
 
-SURPRISE = 0.1
+SURPRISING_CHANGE = 0.1
 """Distance of a spring's vector from its prediction, over its length, above which a load step is halved."""
 
 SMALLEST_STEP = 1 / 64
 """Load step in which Newton's method has to converge, over the load."""
 
-SHORTEST = 1 / 2048
+SHORTEST_STEP = 1 / 2048
 """Smallest load step that distinguishes springs that turn fast from springs that snap."""
 
-BENT = 0.1
+LARGEST_BEND = 0.1
 """Largest distance of a parabola's middle from the straight way's, over its length, to use it."""
 
-FORESEEN, SLACK = 0.25, 0.02
+FORESEEN_SHARE, WORK_SHARE = 0.25, 0.02
 """Limits below which no snap can lie on the way to an equilibrium.
 
 Its distance from a guess over the way to it; and the work of out-of-balance forces in the middle of the way over the
 load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05.
 """
 
-WAY = 8
+WAY_INCREMENTS = 8
 """Increments of a path behind a limit point, over the straight way from there to a stable equilibrium."""
 
 HIGH_ORDER = 16
@@ -132,8 +132,8 @@ class StaticProblem(LoadedNetwork):
         """Return the equilibrium with the springs' full length law.
 
         Newton's method starts from the series about rest; if it fails, from the linear solution; then in load steps
-        from rest. Load steps also replace solutions with springs stretched beyond `FAR` or turned beyond `TURNED`, or
-        with an unstable point half-way from rest: the solution must lie on the path from rest.
+        from rest. Load steps also replace solutions with springs stretched beyond `FAR_STRETCH` or turned beyond
+        `FAR_CHANGE`, or with an unstable point half-way from rest: the solution must lie on the path from rest.
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
@@ -145,10 +145,14 @@ class StaticProblem(LoadedNetwork):
             iterations += found.iterations
             if found.converged:
                 change = self.network.largest_change(found.displacements)  # never below the stretch
-                near = change <= FAR or change <= TURNED and self.network.largest_stretch(found.displacements) <= FAR
+                near = (
+                    change <= FAR_STRETCH
+                    or change <= FAR_CHANGE
+                    and self.network.largest_stretch(found.displacements) <= FAR_STRETCH
+                )
                 rest = np.zeros(found.displacements.shape)
                 if near and (
-                    change <= UNSNAPPED
+                    change <= UNSNAPPED_CHANGE
                     or self._joined(0.0, rest, s, found.displacements, s * self.slope)
                     or self._unstable(s, found)
                 ):
@@ -159,12 +163,12 @@ class StaticProblem(LoadedNetwork):
     def departure(self, s: float, displacements: np.ndarray) -> str:
         """Return why the path from rest does not lead to a stable equilibrium; mostly empty."""
         network = self.network
-        if network.largest_change(displacements) <= UNSNAPPED or self.holds(0.5 * s, 0.5 * displacements):
+        if network.largest_change(displacements) <= UNSNAPPED_CHANGE or self.holds(0.5 * s, 0.5 * displacements):
             return ""
         found = self.nonlinear(s)
         status, message, _ = self.judge(s, found)
         if status is Status.SOLVED:
-            apart = network.largest_change(displacements - found.displacements) > SURPRISE
+            apart = network.largest_change(displacements - found.displacements) > SURPRISING_CHANGE
             return "the path from rest leads to another stable equilibrium" if apart else ""
         return message if found.limit_share < 1 else ""
 
@@ -179,13 +183,13 @@ class StaticProblem(LoadedNetwork):
         """
         network = self.network
         middle, off, way = 0.5 * (here + there), there - guess, there - here
-        if bend * np.linalg.norm(off) <= BENT * np.linalg.norm(way):
+        if bend * np.linalg.norm(off) <= LARGEST_BEND * np.linalg.norm(way):
             middle = middle - bend * off
         half = 0.5 * (s + to)
-        if self.given is None and network.largest_change(off) <= FORESEEN * network.largest_change(way):
+        if self.given is None and network.largest_change(off) <= FORESEEN_SHARE * network.largest_change(way):
             along = network.reduce(way)
             work = (to - s) * float(self.load_at(there) @ along)
-            if abs(float(self.balance(half, middle)[0] @ along)) <= SLACK * abs(work):
+            if abs(float(self.balance(half, middle)[0] @ along)) <= WORK_SHARE * abs(work):
                 return True
         return self.holds(half, middle)
 
@@ -209,7 +213,7 @@ class StaticProblem(LoadedNetwork):
             found = self.newton(there, guess)
             iterations += found.iterations
             # Where springs are far from where the path pointed, some of them have snapped.
-            missed = self.network.largest_change(found.displacements - guess) > SURPRISE
+            missed = self.network.largest_change(found.displacements - guess) > SURPRISING_CHANGE
             looked_at = found.converged and np.isnan(unstable)
             leaves = looked_at and self._unstable(there, found)
             bend = 0.25 * step / (step + last_step)
@@ -222,10 +226,12 @@ class StaticProblem(LoadedNetwork):
                 if end is not None and np.isnan(lost):
                     guess = self.network.expand(end.u)
                     near = self.newton(there, guess)
-                    close = near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISE
+                    close = (
+                        near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISING_CHANGE
+                    )
                     if close and not self._unstable(there, near):
                         found, failed, missed = near, False, False
-            if not failed and (step <= SHORTEST or not missed):
+            if not failed and (step <= SHORTEST_STEP or not missed):
                 if leaves or missed and np.isnan(unstable):
                     unstable = done + step if leaves else done
                 before, last, last_step = last, found.displacements, step
@@ -233,7 +239,9 @@ class StaticProblem(LoadedNetwork):
                 if done >= 1.0:
                     return replace(found, iterations=iterations, unstable_share=unstable)
                 step *= 1.5
-            elif failed and (step <= SHORTEST or not np.isnan(limit) or not found.converged and step <= SMALLEST_STEP):
+            elif failed and (
+                step <= SHORTEST_STEP or not np.isnan(limit) or not found.converged and step <= SMALLEST_STEP
+            ):
                 reason = "cells turn inside out" if inverts else found.reason or "no stable path"
                 return replace(
                     found,
@@ -254,4 +262,4 @@ class StaticProblem(LoadedNetwork):
         if not direct.converged or self._unstable(s, direct):
             return False
         way = float(np.linalg.norm(self.network.reduce(direct.displacements - last)))
-        return continued(self, here, last, before, s, way / WAY).end is not None
+        return continued(self, here, last, before, s, way / WAY_INCREMENTS).end is not None

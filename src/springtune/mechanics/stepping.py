@@ -15,16 +15,16 @@ from ..linalg.factors import Factor, factorize, narrow
 from .integrators import EXPLICIT, LAGGED, BackwardEuler
 from .network import Network
 
-FEWEST = 5000
+LEAST_ENTRIES_A_THREAD = 5000
 """Springs, or entries of a matrix, of a thread: with fewer, threads cost more than they save."""
 
-ROWS_AT_ONCE = 256
+BLOCK_ROWS = 256
 """Rows advanced at once, so that data between the loops stay in the cache."""
 
-CACHE = 2**19
+CACHE_BYTES = 2**19
 """Bytes that a thread may expect to keep near its core."""
 
-DEEPEST_PASS = 8
+MOST_PASS_STEPS = 8
 """Steps of a pass at most: with more, threads wait longer for each other at its ends, and save nothing."""
 
 
@@ -213,7 +213,11 @@ class _ExplicitSteps(Stepper):
         """Particles in the order in which they are advanced, and the place of each in it."""
         mesh = self.motion.network.mesh
         # Where all of them are next to the processor anyway, none are advanced before others.
-        order = narrow(len(mesh.points), mesh.edges) if len(mesh.edges) > FEWEST else np.arange(len(mesh.points))
+        order = (
+            narrow(len(mesh.points), mesh.edges)
+            if len(mesh.edges) > LEAST_ENTRIES_A_THREAD
+            else np.arange(len(mesh.points))
+        )
         return order, np.argsort(order)
 
     def begin(self, u: np.ndarray, v: np.ndarray) -> None:
@@ -263,9 +267,9 @@ class _ExplicitSteps(Stepper):
 
     def _calls(self, steps: int) -> tuple[list[Callable[[], None]], np.ndarray]:
         """Steps of each thread, and the progress by which they wait for each other."""
-        from .kernels import STRIDE
+        from .kernels import PROGRESS_STRIDE
 
-        progress = np.zeros((len(self._threads) + 1, STRIDE), dtype=np.int64)
+        progress = np.zeros((len(self._threads) + 1, PROGRESS_STRIDE), dtype=np.int64)
         # Passes of one depth for all threads, so that none waits for another's longer one at the end.
         rounds = max(1, -(-steps // (len(self._threads) * self._depth)))
         depth = max(1, -(-steps // (len(self._threads) * rounds)))
@@ -307,18 +311,18 @@ def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, 
     """How the rows of a network are advanced: in blocks, some steps of a block before those far from it."""
     rows, entries = len(pointers) - 1, int(pointers[-1])
     each = of_row + of_entry * entries / max(1, rows)
-    for count in range(min(threads, max(1, entries // FEWEST)), 1, -1):
-        depth = int((rows / count - 2 * ROWS_AT_ONCE) / bandwidth)
+    for count in range(min(threads, max(1, entries // LEAST_ENTRIES_A_THREAD)), 1, -1):
+        depth = int((rows / count - 2 * BLOCK_ROWS) / bandwidth)
         if depth >= 1:
-            return count, ROWS_AT_ONCE, min(depth, _deepest(each, bandwidth))
-    if rows * each <= CACHE:
+            return count, BLOCK_ROWS, min(depth, _deepest(each, bandwidth))
+    if rows * each <= CACHE_BYTES:
         return 1, rows, 1
-    return 1, ROWS_AT_ONCE, _deepest(each, bandwidth)
+    return 1, BLOCK_ROWS, _deepest(each, bandwidth)
 
 
 def _deepest(each: float, bandwidth: int) -> int:
     """Steps of a pass whose rows, of so many bytes each, find room in a cache."""
-    return int(np.clip((CACHE / each - ROWS_AT_ONCE) / bandwidth, 1, DEEPEST_PASS))
+    return int(np.clip((CACHE_BYTES / each - BLOCK_ROWS) / bandwidth, 1, MOST_PASS_STEPS))
 
 
 class _BackwardEulerSteps(Stepper):

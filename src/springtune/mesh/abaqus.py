@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import MeshError
-from .groups import IN_OTHER_FILES, Block, Content, places
+from .groups import OTHER_FILES_REASON, Block, Content, places
 
 KEYWORDS_NOT_READ = {
     r"N(GEN|FILL|COPY|MAP)|EL(GEN|COPY)|SYSTEM|PARAMETER|IMPORT|SYMMETRICMODEL\w*|MODELCHANGE": (
@@ -18,7 +18,7 @@ KEYWORDS_NOT_READ = {
         "is not supported; write one flat model: in Abaqus/CAE, Model > Edit Attributes > "
         "Do not use parts and assemblies in input files"
     ),
-    "INCLUDE": IN_OTHER_FILES,
+    "INCLUDE": OTHER_FILES_REASON,
 }
 """Keywords that make, move, remove or import points or cells, and why they are refused."""
 
@@ -97,7 +97,7 @@ class _Model:
         if one.keyword not in reader:
             return
         if "INPUT" in one.given:
-            raise MeshError(IN_OTHER_FILES)
+            raise MeshError(OTHER_FILES_REASON)
         kind = "ELSET" if one.keyword in ("ELEMENT", "ELSET") else "NSET"
         name = one.given.get(kind, "")
         self.sets[kind, name.upper()].append(reader[one.keyword](one))

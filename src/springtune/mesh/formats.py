@@ -18,47 +18,47 @@ from ..safe_io.atomic import check_folder, replacing
 from ..safe_io.inputs import DataElsewhere, bounded, check_alone, fault
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas
-from .groups import IN_OTHER_FILES, LINEAR, Block, Content, GroupedMesh, part_names
-from .sheets import DIGITS, box_fault, in_words, on_sides, outline_of, sheet_fault
+from .groups import LINEAR_CELLS_REMEDY, OTHER_FILES_REASON, Block, Content, GroupedMesh, part_names
+from .sheets import COORDINATE_TOLERANCE, box_fault, in_words, on_sides, outline_of, sheet_fault
 
-CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
+CORNER_COUNTS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
 """Points of cells that are read and of those that make groups, by meshio's name."""
 
 PART_NUMBERS = "part"
 """Cell data whose whole numbers are parts of the body; 0 is the main one."""
 
-TAGS = (PART_NUMBERS, "gmsh:physical", "medit:ref", "avsucd:material", "su2:tag", "ugrid:ref", "netgen:index")
+NUMBER_KEYS = (PART_NUMBERS, "gmsh:physical", "medit:ref", "avsucd:material", "su2:tag", "ugrid:ref", "netgen:index")
 """Cell data with numbers of groups; 0 is none."""
 
-FAMILIES = ("cell_tags", "point_tags")
+MED_FAMILY_KEYS = ("cell_tags", "point_tags")
 """Data in which meshio gives families of MED, and attributes with the groups of each."""
 
-COPIED = ("vtkGhostType", "vtkGhostLevels")
+GHOST_KEYS = ("vtkGhostType", "vtkGhostLevels")
 """Data in which what belongs to other files is not 0."""
 
-NOT_READ = {
-    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), IN_OTHER_FILES),
+REASONS_BY_ENDING = {
+    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), OTHER_FILES_REASON),
     **dict.fromkeys((".bdf", ".nas", ".fem"), "is of Nastran, which is not read; export it as .msh, .inp or .vtu"),
     **dict.fromkeys((".e", ".exo", ".ex2"), "is of Exodus, which is not read; export it as .msh, .inp or .vtu"),
 }
 """Why files are refused by their ending: meshio would miss parts of them, or their groups."""
 
-HDF5 = b"\x89HDF\r\n"
-"""What files of HDF5 begin with, some after a block of their own."""
+HDF5_SIGNATURE = b"\x89HDF\r\n"
+"""What files of HDF5_SIGNATURE begin with, some after a block of their own."""
 
-LARGEST_FILE = 60_000_000
+MOST_FILE_BYTES = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
 
-READ_MEMORY, READ_MEMORY_SHARE = 5e8, 40.0
+READ_BYTES, READ_BYTES_PER_BYTE = 5e8, 40.0
 """Memory that reading a file may take [bytes], and how often its size besides: no sound file takes as much."""
 
-READ_SECONDS, READ_SECONDS_SHARE = 2.0, 3e-6
+READ_SECONDS, READ_SECONDS_PER_BYTE = 2.0, 3e-6
 """Seconds of the processor that it may take, and for each byte besides: some readers wait for lines for ever."""
 
-MOST_IN_FILE = 1_000_000
+MOST_FILE_POINTS = 1_000_000
 """Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
 
-LONGEST_SAID = 120
+MOST_MESSAGE_CHARACTERS = 120
 """Most characters of a message of meshio that are shown."""
 
 
@@ -85,7 +85,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     places: list[np.ndarray] = []
     blocks: list[tuple[str, np.ndarray, str]] = []
     labels = part_names(grouped)
-    for name, count in CORNERS.items():
+    for name, count in CORNER_COUNTS.items():
         for part in ("", *grouped.parts) if count in labels else ():
             mask = labels[count] == part
             if mask.any():
@@ -137,14 +137,16 @@ def read_stored(path: str | Path) -> Mesh:
     return _assembled(path, _by_meshio(library().read(path)), 1.0, np.inf)[0]
 
 
-def _assembled(path: str | Path, content: Content, unit: float, most: float = MOST_IN_FILE) -> tuple[Mesh, np.ndarray]:
+def _assembled(
+    path: str | Path, content: Content, unit: float, most: float = MOST_FILE_POINTS
+) -> tuple[Mesh, np.ndarray]:
     """Return the mesh of a file, and its particles' numbers in the file; `unit` in m."""
     if len(content.points) > most:
         raise MeshError(f"{path}: {len(content.points)} points, and at most {most} are read; write a coarser mesh")
     cells: dict[int, list[np.ndarray]] = defaultdict(list)
     for kind, corners in content.cells:
-        if CORNERS[kind] > 2 and len(corners):
-            cells[CORNERS[kind]].append(corners)
+        if CORNER_COUNTS[kind] > 2 and len(corners):
+            cells[CORNER_COUNTS[kind]].append(corners)
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
     joined = {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
@@ -161,16 +163,16 @@ def _file_content(path: str | Path) -> Content:
     if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     size, ending = Path(path).stat().st_size, Path(path).suffix.lower()
-    if ending in NOT_READ:
-        raise MeshError(f"{path}: {NOT_READ[ending]}")
+    if ending in REASONS_BY_ENDING:
+        raise MeshError(f"{path}: {REASONS_BY_ENDING[ending]}")
     if ending not in library().extension_to_filetypes:
         raise MeshError(f"{path}: unknown format '{ending}'; convert it to .vtu or .msh")
     if size == 0:
         raise MeshError(f"{path}: the file is empty; write the mesh again")
-    if size > LARGEST_FILE:
-        most = f"at most {LARGEST_FILE // 1_000_000} MB are read"
+    if size > MOST_FILE_BYTES:
+        most = f"at most {MOST_FILE_BYTES // 1_000_000} MB are read"
         raise MeshError(f"{path}: {size / 1e6:.0f} MB, and {most}; write a coarser mesh, or binary VTU")
-    memory, seconds = READ_MEMORY + READ_MEMORY_SHARE * size, READ_SECONDS + READ_SECONDS_SHARE * size
+    memory, seconds = READ_BYTES + READ_BYTES_PER_BYTE * size, READ_SECONDS + READ_SECONDS_PER_BYTE * size
     try:
         # meshio prints what it leaves out, and exits where it reads nothing.
         with redirect_stderr(io.StringIO()), np.errstate(all="ignore"), bounded(memory, seconds):
@@ -180,7 +182,7 @@ def _file_content(path: str | Path) -> Content:
     except DataElsewhere as error:  # names the file
         raise MeshError(str(error)) from None
     except (Exception, SystemExit) as error:
-        message = " ".join(str(error).split())[:LONGEST_SAID]
+        message = " ".join(str(error).split())[:MOST_MESSAGE_CHARACTERS]
         shown = f" ({message})" if re.search(r"\w{2} \S", message) else ""  # a key alone tells nothing
         why = f"it is damaged, or has what is not supported{shown}; write it again, in text, or as .vtu"
         raise MeshError(f"{path}: cannot be read: {why}") from None
@@ -195,7 +197,7 @@ def _read(path: str | Path, ending: str) -> Content:
         return _read_vtu(raw)
     if ending == ".msh" and raw.lstrip()[:1] == b"$":  # others are of Ansys
         return gmsh.read(raw) or gmsh.check_once(_by_meshio(library().read(path)))
-    if HDF5 in raw:
+    if HDF5_SIGNATURE in raw:
         check_alone(path)
     return _by_meshio(library().read(path))
 
@@ -206,7 +208,7 @@ def _read_vtu(raw: bytes) -> Content:
     if re.search(rb"compressor\s*=\s*.vtkLZ4", head):
         raise MeshError("is compressed by LZ4, which is not read; write it with ZLib, or without compression")
     if re.search(rb"type\s*=\s*.P(Unstr|Poly)", head):
-        raise MeshError(IN_OTHER_FILES)
+        raise MeshError(OTHER_FILES_REASON)
     pieces = len(re.findall(rb"<Piece\b", head))
     if pieces > 1:
         raise MeshError(f"has {pieces} pieces, and one is read; join them, in ParaView by the filter Clean to Grid")
@@ -215,8 +217,8 @@ def _read_vtu(raw: bytes) -> Content:
         # Version 2 tells copies and polyhedra in another way, cells alike; meshio knows version 1.
         file.write_bytes(re.sub(rb"(<VTKFile[^>]*version\s*=\s*.)2\.\d", rb"\g<1>1.0", head) + mark + tail)
         found = library().read(file)
-    if any(np.any(array) for key in COPIED for array in found.cell_data.get(key, ())):
-        raise MeshError(IN_OTHER_FILES)
+    if any(np.any(array) for key in GHOST_KEYS for array in found.cell_data.get(key, ())):
+        raise MeshError(OTHER_FILES_REASON)
     return _by_meshio(found)
 
 
@@ -229,21 +231,21 @@ def _by_meshio(found: Any) -> Content:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         shape = " x ".join(map(str, points.shape))
         raise MeshError(f"coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
-    if others := [block.type for block in found.cells if block.type not in CORNERS]:
-        raise MeshError(f"has cells '{others[0]}'; {LINEAR}")
+    if others := [block.type for block in found.cells if block.type not in CORNER_COUNTS]:
+        raise MeshError(f"has cells '{others[0]}'; {LINEAR_CELLS_REMEDY}")
     content = Content(points, [Block(block.type, np.asarray(block.data)) for block in found.cells])
     for kind, corners in content.cells:
-        if len(corners) and (corners.shape[1:] != (CORNERS[kind],) or corners.dtype.kind not in "iu"):
+        if len(corners) and (corners.shape[1:] != (CORNER_COUNTS[kind],) or corners.dtype.kind not in "iu"):
             shape = f"numbers {corners.dtype} of shape {corners.shape}"
             raise MeshError(f"cells '{kind}' by {shape}; write the mesh again")
     starts = content.starts()
     # Names with a colon are notes of a format, as of MED.
     content.cell_groups.update({name: [] for name in found.field_data if ":" not in name})
-    dimensions = np.repeat([min(CORNERS[kind] - 1, 2) for kind, _ in content.cells], np.diff(starts))
+    dimensions = np.repeat([min(CORNER_COUNTS[kind] - 1, 2) for kind, _ in content.cells], np.diff(starts))
     names = {tuple(map(int, one)): name for name, one in found.field_data.items() if len(one) == 2}
     for key, arrays in found.cell_data.items():
         values = np.concatenate(arrays)
-        if key in TAGS and values.dtype.kind in "iu":
+        if key in NUMBER_KEYS and values.dtype.kind in "iu":
             for tag, dimension in np.unique(np.stack([values, dimensions])[:, values != 0], axis=1).T.tolist():
                 name = names.get((tag, dimension), str(tag))
                 content.cell_groups[name].append(np.flatnonzero((values == tag) & (dimensions == dimension)))
@@ -260,7 +262,7 @@ def _add_marked(
     """Add groups by data of cells or points: families of MED, or a mark."""
     if values.ndim != 1 or values.dtype.kind not in "iub":
         return
-    if key in FAMILIES:
+    if key in MED_FAMILY_KEYS:
         for tag, names in getattr(found, key, {}).items():
             for name in names:
                 groups[name].append(np.flatnonzero(values == tag))
@@ -309,7 +311,7 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
     box = np.array([length, height])
     mesh = Mesh(mesh.points - mesh.points.min(axis=0), mesh.triangles, mesh.quads)
     extent = mesh.points.max(axis=0)
-    if np.abs(extent / box - 1).max() > DIGITS:
+    if np.abs(extent / box - 1).max() > COORDINATE_TOLERANCE:
         shown, wanted = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
         raise MeshError(f"{path}: extends over {shown} mm, its beam over {wanted} mm; correct the unit or the beam")
     try:
@@ -399,7 +401,9 @@ class _Groups:
         cells = [(kind, corners, own) for (kind, corners), own in zip(content.cells, np.split(mask, starts[1:-1]))]
         lines = [corners[own] for kind, corners, own in cells if kind == "line"]
         vertices = [corners[own].ravel() for kind, corners, own in cells if kind == "vertex"]
-        masks = {n: np.concatenate([own for kind, _, own in cells if CORNERS[kind] == n]) for n in self.mesh.cells}
+        masks = {
+            n: np.concatenate([own for kind, _, own in cells if CORNER_COUNTS[kind] == n]) for n in self.mesh.cells
+        }
         edges = np.unique(np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]), axis=0)
         nodes = np.unique(np.concatenate([[], *vertices, *content.point_groups.get(name, [])]).astype(np.int64))
         if not NAME.fullmatch(name):

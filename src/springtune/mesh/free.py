@@ -9,7 +9,7 @@ from .cells import Mesh, MeshError, signed_areas
 from .rows import ROW_HEIGHT
 from .types import check_box, mesh_type
 
-FITTING = 1.0 + 1e-9
+EDGE_FACTOR = 1.0 + 1e-9
 """Edge imposed on netgen, over the wanted one: a side of n edges exactly shall not be split into n + 1 by rounding."""
 
 
@@ -80,7 +80,9 @@ def free(length: float, height: float, size: float) -> Mesh:
     box = np.array([length, height]) / size
     corners = box * [(0, 0), (1, 0), (1, 1), (0, 1)]
     lines = [(i, (i + 1) % 4, 1, 0) for i in range(4)]
-    made = triangulate(corners, lines, f"{length:g} x {height:g} m at {size:g} m", "give another size", maxh=FITTING)
+    made = triangulate(
+        corners, lines, f"{length:g} x {height:g} m at {size:g} m", "give another size", maxh=EDGE_FACTOR
+    )
     points = made.points
     for axis in range(2):
         points[np.abs(points[:, axis]) < 1e-9, axis] = 0.0

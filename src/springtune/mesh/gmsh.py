@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .cells import MeshError
-from .groups import LINEAR, Block, Content, places
+from .groups import LINEAR_CELLS_REMEDY, Block, Content, places
 
 ELEMENT_TYPES = {15: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4)}
 """Name and number of points of elements that are read, by Gmsh's number."""
@@ -76,7 +76,9 @@ def read(raw: bytes) -> Content | None:
     for _ in range(elements.blocks()):
         dimension, entity, kind = elements.take("i", 3).tolist()
         if kind not in ELEMENT_TYPES:
-            raise MeshError(f"has cells '{OTHER_ELEMENTS.get(kind, kind)}'; {LINEAR}: Mesh.ElementOrder = 1")
+            raise MeshError(
+                f"has cells '{OTHER_ELEMENTS.get(kind, kind)}'; {LINEAR_CELLS_REMEDY}: Mesh.ElementOrder = 1"
+            )
         count, width = elements.one("u"), 1 + ELEMENT_TYPES[kind][1]
         corners = elements.take("u", count * width).reshape(count, width)[:, 1:]
         own = [names.get((dimension, tag), str(tag)) for tag in groups.get((dimension, entity), ())]

@@ -150,10 +150,10 @@ def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
     return found
 
 
-IN_OTHER_FILES = "parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
+OTHER_FILES_REASON = "parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
 """Why a file is refused that names other files."""
 
-LINEAR = "write linear triangles and quadrilaterals only"
+LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"
 """What to do with cells that are not read."""
 
 

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
-from .free import FITTING, Triangulation, triangulate, upright
+from .free import EDGE_FACTOR, Triangulation, triangulate, upright
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
 from .sheets import nearer
 from .sides import OutlineSide, Point, winds_about
 from .types import too_many
 
-LEAST_AROUND = 6
+LEAST_EDGES_A_TURN = 6
 """Fewest edges of a full turn of an arc, so that a small hole remains."""
 
-FINEST = 4e-6
+LEAST_SIZE_SHARE = 4e-6
 """Smallest mesh size over the extent of a shape: netgen merges points a millionth apart."""
 
 GRADING = 0.3
 """How much longer edges get over the distance from shorter ones, at most: netgen's."""
 
-EDGES_A_LINE = 0.6
+LINE_SIZE_SHARE = 0.6
 """Length of a line over the mesh size that netgen takes it for, at least: 1 would divide edges next to shorter ones."""
 
 MOST_ROUNDS = 20
@@ -98,7 +98,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
         if name and name not in known:
             there = ", ".join(sorted(map(str, known))) or "none"
             raise MeshError(f"{told}: {what} has no side, point or part of that name; known: {there}")
-        if name and value < FINEST * max(right - left, high - low):
+        if name and value < LEAST_SIZE_SHARE * max(right - left, high - low):
             raise MeshError(f"{told}: {value!r} is less than some millionths of {what}; give more")
         if value > size:
             raise MeshError(f"{told}: {value!r} is larger than the mesh size, {size!r}; give at most that")
@@ -144,7 +144,7 @@ def _divided(
                 count = math.ceil((side.length_to(end) - side.length_to(begin)) / size * (1 - 1e-9))
                 if side.arc:
                     turn = abs(side.arc[3]) * (end - begin)
-                    count = max(count, math.ceil(LEAST_AROUND * turn / (2 * math.pi) * (1 - 1e-9)))
+                    count = max(count, math.ceil(LEAST_EDGES_A_TURN * turn / (2 * math.pi) * (1 - 1e-9)))
                 ends = side.divided(max(count, 1), begin, end)
                 stretches += _Stretch(side, begin, end, inner, outer).cut(ends)
     fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
@@ -221,9 +221,9 @@ def _netgen(
         region_sizes={
             number: sizes[region] / unit for number, region in enumerate(regions, 1) if region and region in sizes
         },
-        maxh=FITTING,
+        maxh=EDGE_FACTOR,
         grading=GRADING,
-        segmentsperedge=EDGES_A_LINE,
+        segmentsperedge=LINE_SIZE_SHARE,
     )
     points = made.points
     given = (np.array(list(numbers)) - origin) / unit

@@ -7,10 +7,10 @@ import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
 
-DIGITS = 1e-6
+COORDINATE_TOLERANCE = 1e-6
 """Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
 
-MOST_SEARCHED = 2000
+MOST_SEARCHED_ENDS = 2000
 """Most ends of edges checked for one that hangs on another edge."""
 
 MOST_PAIRS = 4_000_000
@@ -32,13 +32,15 @@ def sheet_fault(mesh: Mesh) -> str:
     points = mesh.points
     ways = np.diff(points[outline], axis=1)[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
-    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * lengths.min())
+    small = min(COORDINATE_TOLERANCE * np.ptp(points, axis=0).max(), 0.01 * lengths.min())
     one, other, _ = nearer(points, outline, np.full(len(outline), 0.5 * small))
     # Edges that share a point touch where the outline turns back on itself there.
     order, (x, y) = np.argsort(outline[:, 0]), (ways / lengths[:, None]).T
     low, high = (np.searchsorted(outline[order, 0], outline[:, 1], side) for side in ("left", "right"))
     after = order[np.minimum(low + np.arange((high - low).max())[:, None], high - 1)]
-    which, back = np.nonzero((x * x[after] + y * y[after] < 0) & (np.abs(x * y[after] - y * x[after]) < DIGITS))
+    which, back = np.nonzero(
+        (x * x[after] + y * y[after] < 0) & (np.abs(x * y[after] - y * x[after]) < COORDINATE_TOLERANCE)
+    )
     touching = np.unique(np.concatenate([one, other, back, after[which, back]]))
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
@@ -88,7 +90,7 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
     """Return why edges (n, 2) have one cell although others are near, with the remedy, or an empty string."""
     from scipy.spatial import cKDTree  # here, since a good mesh needs none
 
-    small = DIGITS * np.ptp(points, axis=0).max()
+    small = COORDINATE_TOLERANCE * np.ptp(points, axis=0).max()
     ends = np.unique(edges)
     twins = sorted(cKDTree(points[ends]).query_pairs(small))
     if twins:
@@ -98,7 +100,7 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
         return f"two points at {in_words(one)}{apart}, do not join their cells ({count}); merge duplicate points"
     start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
     squares = (along**2).sum(axis=1)
-    for end in ends[:MOST_SEARCHED]:
+    for end in ends[:MOST_SEARCHED_ENDS]:
         to = points[end] - start
         share = (to * along).sum(axis=1) / squares
         aside = np.linalg.norm(to - share[:, None] * along, axis=1)
@@ -193,8 +195,8 @@ def edge_in_words(points: np.ndarray, ends: Sequence[int] | np.ndarray) -> str:
 
 def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
     """Return a mesh of a box (2,) [m] at the origin with its sides made straight."""
-    near = np.abs(mesh.points - box) <= DIGITS * box
-    points = np.where(near, box, np.where(mesh.points <= DIGITS * box, 0.0, mesh.points))
+    near = np.abs(mesh.points - box) <= COORDINATE_TOLERANCE * box
+    points = np.where(near, box, np.where(mesh.points <= COORDINATE_TOLERANCE * box, 0.0, mesh.points))
     for corners in mesh.cells.values():
         flat = corners[signed_areas(points, corners) <= 0]
         if len(flat):
@@ -236,7 +238,9 @@ def _misfilled(mesh: Mesh, box: np.ndarray) -> str:
     A conforming plane sheet whose outline is on the sides of the box has no slits, holes or overlaps of any width.
     """
     share = mesh.area / box.prod()
-    lead = f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > DIGITS else ""
+    lead = (
+        f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > COORDINATE_TOLERANCE else ""
+    )
     fault = sheet_fault(mesh)
     outline, _ = outline_of(mesh)
     ends = mesh.points[outline]

@@ -12,10 +12,10 @@ from .sheets import in_words, nearer, winding
 Point = tuple[float, float]
 """Coordinates [m]."""
 
-SAME = 1e-9
+RADIUS_TOLERANCE = 1e-9
 """Largest relative difference of two ends' distances from the centre of a circle."""
 
-APART = 1e-9
+LEAST_SIDE_GAP = 1e-9
 """Smallest distance of sides over the extent of the shape; nearer ones touch."""
 
 CHORD_ERROR = 1e-6
@@ -59,16 +59,20 @@ class OutlineSide:
         (x, y), (u, v) = ((end[0] - centre[0], end[1] - centre[1]) for end in (self.start, self.end))
         first, second = math.hypot(x, y), math.hypot(u, v)
         about = f"arc from {in_words(self.start)} to {in_words(self.end)} about {in_words(centre)}"
-        if not min(first, second) > SAME * max(first, second):
+        if not min(first, second) > RADIUS_TOLERANCE * max(first, second):
             raise ValueError(f"{about}: an end is at the centre; move one of them")
-        if abs(first - second) <= SAME * first:
+        if abs(first - second) <= RADIUS_TOLERANCE * first:
             across = along = 0.5 * (first + second)
         else:
             # 1 / a^2 and 1 / b^2 of x^2 / a^2 + y^2 / b^2 = 1 at both ends, scaled.
             large = max(first, second)
             x2, y2, u2, v2 = ((one / large) ** 2 for one in (x, y, u, v))
             determinant = x2 * v2 - u2 * y2
-            shares = [(v2 - y2) / determinant, (x2 - u2) / determinant] if abs(determinant) > SAME else [-1.0, -1.0]
+            shares = (
+                [(v2 - y2) / determinant, (x2 - u2) / determinant]
+                if abs(determinant) > RADIUS_TOLERANCE
+                else [-1.0, -1.0]
+            )
             if not min(shares) > 1e-12:
                 ends = f"the ends are {1e3 * first:.9g} and {1e3 * second:.9g} mm from it"
                 why = f"{ends}, and no ellipse with axes along x and y about it goes through both"
@@ -278,7 +282,7 @@ def meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, int],
         points.append(corners)
         names += [(which, number) for number in numbers.tolist()]
         errors = [0.0 if side.arc is None else CHORD_ERROR * math.dist(*extent(sides)) for side in sides]
-        reaches.append(APART * size + np.array(errors)[numbers])
+        reaches.append(LEAST_SIDE_GAP * size + np.array(errors)[numbers])
     places, ends = np.concatenate(points), np.concatenate(edges)
     one, other, _ = nearer(places, ends, np.concatenate(reaches))
     if not len(one):

@@ -9,7 +9,7 @@ from typing import TypeVar
 from ..registry import Declaration, Registry
 from .cells import SIDES, Mesh, MeshError
 
-MOST_MESHED = 5_000_000
+MOST_MESH_PARTICLES = 5_000_000
 """Particles beyond which no mesh is made: its edges alone take gigabytes."""
 
 
@@ -25,18 +25,20 @@ def check_box(length: float, height: float, size: float) -> None:
             raise MeshError(f"{name}: {value!r} is not a number above zero; give one in m")
     if size > LARGEST_SIZE * min(length, height):
         raise MeshError(f"size: {size!r} is no size of {length:g} x {height:g} m; give at most {min(length, height):g}")
-    if not max(length / size, 1.0) * max(height / size, 1.0) <= 2 * MOST_MESHED:
-        least = f"{1e3 * math.sqrt(length * height / MOST_MESHED):.2g} mm"
+    if not max(length / size, 1.0) * max(height / size, 1.0) <= 2 * MOST_MESH_PARTICLES:
+        least = f"{1e3 * math.sqrt(length * height / MOST_MESH_PARTICLES):.2g} mm"
         raise MeshError(f"size: {size!r} makes too many particles of {length:g} x {height:g} m; give at least {least}")
 
 
 def too_many(count: float, size: float, side: float, body: str) -> str:
     """Return why so many particles are refused, with the remedy, or an empty string; `size`, `side` in m."""
-    if count <= MOST_MESHED:
+    if count <= MOST_MESH_PARTICLES:
         return ""
-    least = 1.1 * size * math.sqrt(count / MOST_MESHED)
+    least = 1.1 * size * math.sqrt(count / MOST_MESH_PARTICLES)
     remedy = f"at least {1e3 * least:.2g} mm" if least < side else f"a shorter {body.partition(' ')[0]}"
-    return f"makes some {count:.2g} particles of {body}, more than can be meshed ({MOST_MESHED:,}); give {remedy}"
+    return (
+        f"makes some {count:.2g} particles of {body}, more than can be meshed ({MOST_MESH_PARTICLES:,}); give {remedy}"
+    )
 
 
 def nearest_whole(ratio: float) -> int:

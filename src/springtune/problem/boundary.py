@@ -17,16 +17,16 @@ from .shapes import LoadCase, Quantity
 FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
 """Where the profile of a pressed face is given, over its length [1]."""
 
-ON_POINT = 1e-9
+POINT_TOLERANCE = 1e-9
 """Distance from a particle below which a point is that particle, over the extent of the mesh [1]."""
 
-OUTSIDE = 0.25
+OUTSIDE_TOLERANCE = 0.25
 """How far outside the nearest cell a point may lie, over its size [1], as next to an arc."""
 
-IN_CELL = 1e-6
+CELL_TOLERANCE = 1e-6
 """How far outside a cell a point counts as in it, over the cell's size [1]: coordinates are rounded."""
 
-MAX_ITERATIONS = 50
+MOST_NEWTON_STEPS = 50
 """Newton steps that look for a point in a quadrilateral."""
 
 
@@ -207,20 +207,20 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
     edge cuts off the arc that the point is on.
     """
     mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
-    slack, found = ON_POINT * np.ptp(mesh.points, axis=0).max(), None
-    best = -OUTSIDE
+    slack, found = POINT_TOLERANCE * np.ptp(mesh.points, axis=0).max(), None
+    best = -OUTSIDE_TOLERANCE
     for count, corners in mesh.cells.items():
         here = mesh.points[corners] - point
         # What has it is among the cells whose boxes are near.
         low, high = here.min(axis=1), here.max(axis=1)
-        room = OUTSIDE * (high - low).max(axis=1, keepdims=True) + slack
+        room = OUTSIDE_TOLERANCE * (high - low).max(axis=1, keepdims=True) + slack
         for cell in np.flatnonzero(((low <= room) & (high >= -room)).all(axis=1)):
             shares = _shares(here[cell])
             if shares is not None and shares.min() > best:
                 best, found = float(shares.min()), (count, int(cell), shares)
     if found is None:
         raise ValueError(f"point: {name!r} at {in_words(point)} is outside of the mesh; move it, or correct its unit")
-    shares = np.where(np.abs(found[2]) <= ON_POINT, 0.0, found[2])
+    shares = np.where(np.abs(found[2]) <= POINT_TOLERANCE, 0.0, found[2])
     return found[0], found[1], shares / shares.sum()
 
 
@@ -231,7 +231,7 @@ def _shares(corners: np.ndarray) -> np.ndarray | None:
         opposite = after[:, 0] * before[:, 1] - after[:, 1] * before[:, 0]
         return opposite / opposite.sum()
     place = np.full(2, 0.5)
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(MOST_NEWTON_STEPS):
         (a, b), (c, d) = 1 - place, place
         shares = np.array([a * b, c * b, c * d, a * d])
         slopes = np.array([[-b, b, d, -d], [-a, -c, c, a]]) @ corners
@@ -268,6 +268,6 @@ def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
 def _in_body(grouped: GroupedMesh, name: str) -> bool:
     """Whether a named point is in a cell, or within rounding of one."""
     try:
-        return bool(cell_at(grouped, name)[2].min() > -IN_CELL)
+        return bool(cell_at(grouped, name)[2].min() > -CELL_TOLERANCE)
     except ValueError:
         return False

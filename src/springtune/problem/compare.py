@@ -11,7 +11,7 @@ from .status import Status
 ROOT_TOLERANCE = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""
 
-HALVINGS = 12
+MOST_BISECTIONS = 12
 """Bisections in search of a best stiffness where a curve ends."""
 
 
@@ -155,7 +155,7 @@ def _last_root(
     solve: Callable[[float], float], reference: float, softness: float, unsolved: float, error: float
 ) -> float | None:
     """Stiffness between a softness that has an equilibrium and one that has none; None where there is no root."""
-    for _ in range(HALVINGS):
+    for _ in range(MOST_BISECTIONS):
         middle = 0.5 * (softness + unsolved)
         there = solve(1.0 / middle) - reference
         if not np.isfinite(there):

@@ -43,13 +43,13 @@ def put(frozen: object, **values: object) -> None:
         object.__setattr__(frozen, name, value)
 
 
-LEAST, MOST = 1e-40, 1e40
+LEAST_QUANTITY, MOST_QUANTITY = 1e-40, 1e40
 """Quantities between which products of several stay numbers [SI units]; forces are what they are."""
 
 
 def beyond(number: float, kind: str) -> bool:
     """Whether a quantity is so small or large that nothing can be computed with it."""
-    return kind != "force" and not LEAST <= number <= MOST
+    return kind != "force" and not LEAST_QUANTITY <= number <= MOST_QUANTITY
 
 
 def _remedy(kind: str) -> str:

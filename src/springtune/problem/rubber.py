@@ -10,21 +10,21 @@ from ..safe_io.inputs import csv_rows, numbers
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
 from .quantities import Number, positive, put
 
-LEAST_SHARE = 0.05
+LEAST_STRESS_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
 
-CHECKED = 400
+CHECKED_STRETCHES = 400
 """Stretches of each test over the range of the data at which a fitted law has to be stable."""
 
 FIT_DIGITS = 10
 """Digits of what is fitted."""
 
-TWO_COLUMNS = (
+COLUMNS_REMEDY = (
     "give two columns, stretch or engineering strain and nominal stress, with a head such as 'stretch,nominal stress "
     "[MPa]' or 'strain [%],nominal stress [MPa]'"
 )
 
-STRETCHES, STRESSES = (0.01, 50.0), (0.1, 1e12)
+STRETCH_RANGE, STRESS_RANGE = (0.01, 50.0), (0.1, 1e12)
 """Stretches [1] and largest stresses [Pa] that are read."""
 
 _HEAD = re.compile(r"(?:(?:engineering|nominal)[ _])?(stretch|strain|stress) *(?:[\[(](.{0,20})[\])])?", re.IGNORECASE)
@@ -69,21 +69,21 @@ class TensileTest:
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
         """Read a CSV file of stretch or engineering strain and of nominal stress, with units in the columns' heads."""
-        (line, heads), *rows = csv_rows(path, TestDataError, TWO_COLUMNS)
+        (line, heads), *rows = csv_rows(path, TestDataError, COLUMNS_REMEDY)
         where = [f"'{path}', line {line}, column {head!r}: " for head in heads]
         if len(heads) != 2:
-            raise TestDataError(f"{where[0]}the file has {len(heads)} columns; {TWO_COLUMNS}")
+            raise TestDataError(f"{where[0]}the file has {len(heads)} columns; {COLUMNS_REMEDY}")
         read = list(map(_column, heads, where))
         order = [0, 1] if read[1][0] == "stress" else [1, 0]
         (kind, scale), (other, factor) = (read[n] for n in order)
         if kind == "stress" or other != "stress":
-            raise TestDataError(f"{where[0]}the other column is {heads[1]!r}; {TWO_COLUMNS}")
+            raise TestDataError(f"{where[0]}the other column is {heads[1]!r}; {COLUMNS_REMEDY}")
         x, y = np.array(numbers(path, rows, heads, TestDataError)).reshape(-1, 2).T[order]
         with np.errstate(over="ignore"):
             stretch, stress = scale * x + (kind == "strain"), factor * y
         for n, what, sizes, (least, most) in (
-            (0, "a stretch of {:g}", stretch, STRETCHES),
-            (1, "a largest stress of {:g} Pa", np.abs(stress).max(keepdims=True, initial=0), STRESSES),
+            (0, "a stretch of {:g}", stretch, STRETCH_RANGE),
+            (1, "a largest stress of {:g} Pa", np.abs(stress).max(keepdims=True, initial=0), STRESS_RANGE),
         ):
             wrong = sizes[(sizes < least) | (sizes > most)]
             if len(wrong) and rows:
@@ -96,7 +96,7 @@ def _column(head: str, where: str) -> tuple[str, float]:
     """Return whether a head is of stretch, strain or stress, and the size of its unit."""
     found = _HEAD.fullmatch(head.strip())
     if not found:
-        raise TestDataError(f"{where}is neither stretch, engineering strain nor nominal stress; {TWO_COLUMNS}")
+        raise TestDataError(f"{where}is neither stretch, engineering strain nor nominal stress; {COLUMNS_REMEDY}")
     kind, unit = found[1].lower(), found[2] or ""
     if kind == "strain" and not unit:
         raise TestDataError(f"{where}may be fractions or percent; name it 'strain [-]', 'strain [%]' or 'stretch'")
@@ -105,7 +105,7 @@ def _column(head: str, where: str) -> tuple[str, float]:
     except (KeyError, ValueError):
         size = 0.0
     if not size or (kind == "stretch" and size != 1):
-        raise TestDataError(f"{where}{unit!r} is no unit of {kind}; {TWO_COLUMNS}")
+        raise TestDataError(f"{where}{unit!r} is no unit of {kind}; {COLUMNS_REMEDY}")
     return kind, size
 
 
@@ -126,7 +126,7 @@ def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
 def relative_weights(test: TensileTest) -> np.ndarray:
     """Return what makes errors of a test's stresses relative [1/Pa], shape (n,)."""
     size = np.abs(test.stress)
-    return np.asarray(1 / np.maximum(size, LEAST_SHARE * size.max()))
+    return np.asarray(1 / np.maximum(size, LEAST_STRESS_SHARE * size.max()))
 
 
 def stress_columns(stretch: np.ndarray, terms: int) -> np.ndarray:
@@ -220,7 +220,7 @@ def fit_rubber(
 def _check(law: Rubber, name: str) -> None:
     """Refuse a law whose true stress falls somewhere in the range of I_1 of the data, in one of the tests."""
     for test in RUBBER_TESTS:
-        q = np.linspace(1, np.sqrt(law.largest + 3), CHECKED)  # I_1 is above the square of the stretch
+        q = np.linspace(1, np.sqrt(law.largest + 3), CHECKED_STRETCHES)  # I_1 is above the square of the stretch
         q = q[law.excess(test, q) <= law.largest]
         falls = np.flatnonzero(np.diff(q * law.stress(test, q)) <= 0)
         if len(falls):

@@ -28,7 +28,7 @@ from .quantities import Number, nearest, positive, put, quantity
 Place = tuple[Number, Number]
 """Coordinates [m]."""
 
-ON_SIDE = 1e-6
+SIDE_TOLERANCE = 1e-6
 """Distance from a side at which a named point is put on it, over the extent of the shape: coordinates are rounded."""
 
 
@@ -613,7 +613,9 @@ class Shape:
         rounds = [("outline", sides)]
         rounds += [(f"hole {number}", _round(hole.outline, "hole")) for number, hole in enumerate(self.holes, start=1)]
         for what, one in rounds:
-            short = [number for number, side in enumerate(one, start=1) if math.dist(*extent([side])) < ON_SIDE * size]
+            short = [
+                number for number, side in enumerate(one, start=1) if math.dist(*extent([side])) < SIDE_TOLERANCE * size
+            ]
             if short:
                 raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
             for before, side in zip((one[-1], *one[:-1]), one):
@@ -644,7 +646,7 @@ class Shape:
     def _placed(self, name: str, point: Point) -> Point:
         """A named point, on the side that it is next to."""
         _named(name, "point")
-        near = ON_SIDE * max(high - low for low, high in zip(*self.extent))
+        near = SIDE_TOLERANCE * max(high - low for low, high in zip(*self.extent))
         for one in self.rounds:
             for side in one.sides:
                 parameter = side.parameter_near(point, near)

@@ -43,13 +43,13 @@ class BeamField:
         return interpolate(self.x, self.y, self.displacements, points)
 
 
-MOST_EFFECT = 0.01
+MOST_ROTATION_EFFECT = 0.01
 """Largest effect of finite rotation on a displacement, relative, with which a reference of small strain applies."""
 
 MOST_STRAIN = 0.15
 """Largest strain for a small-strain reference; the paper's beams stretch by 5 %, its block by 11 %."""
 
-SHARE = 0.95
+JUDGED_AREA_SHARE = 0.95
 """Share of a body in which rotations and strains are at most those that it is judged by: corners are singular."""
 
 
@@ -78,10 +78,10 @@ def most_rotation_and_strain(gradients: np.ndarray, areas: np.ndarray) -> tuple[
 
 
 def _exceeded_rarely(values: np.ndarray, areas: np.ndarray) -> float:
-    """Value that most of a body does not exceed, see `SHARE`."""
+    """Value that most of a body does not exceed, see `JUDGED_AREA_SHARE`."""
     order = np.argsort(values)
     # A hair less: where cells of some number make up the share exactly, rounding shall not ask for one more.
-    reached = np.searchsorted(np.cumsum(areas[order]), SHARE * areas.sum() * (1 - 1e-9))
+    reached = np.searchsorted(np.cumsum(areas[order]), JUDGED_AREA_SHARE * areas.sum() * (1 - 1e-9))
     return float(values[order[min(int(reached), len(order) - 1)]])
 
 
@@ -117,7 +117,10 @@ def beyond_linear(rotation: float, strain: float) -> str:
     """Return why a small-strain reference of this rotation [rad] and strain [1] does not fit nonlinear kinematics."""
     reasons = []
     # The first term of the series bounds the effect: most beams do without the elastica, and without importing it.
-    if 4 / 35 * (2 * rotation) ** 2 > MOST_EFFECT and -(effect := rotation_effect(rotation)) > MOST_EFFECT:
+    if (
+        4 / 35 * (2 * rotation) ** 2 > MOST_ROTATION_EFFECT
+        and -(effect := rotation_effect(rotation)) > MOST_ROTATION_EFFECT
+    ):
         reasons.append(f"it turns by {abs(rotation):.2g} rad, and a cantilever that turns so far deflects by "
                        f"{-100 * effect:.2g} % less than in small strain")  # fmt: skip
     if abs(strain) > MOST_STRAIN:

@@ -18,7 +18,7 @@ from ..problem.shapes import LoadCase, Shape
 from .shapes import VOIGT, solve_shape
 from .triangles import shape_functions
 
-ACCURACY = 1e-4
+ENERGY_TOLERANCE = 1e-4
 """Largest relative error estimate of the energy at which a level of finite elements is taken."""
 
 ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
@@ -35,7 +35,7 @@ class Family:
     def __init__(
         self, shape: Shape, load: LoadCase, grouped: GroupedMesh | None, materials: Mapping[str, AnyMaterial]
     ) -> None:
-        self.reference = solve_shape(shape, load, materials, grouped, tolerance=ACCURACY)
+        self.reference = solve_shape(shape, load, materials, grouped, tolerance=ENERGY_TOLERANCE)
         self._level = level = copy(self.reference._level)
         space, mesh = level.space, level.space.mesh
         self._free, self.forces, self._given = ~level.held.ravel(), level.forces().ravel(), level.supports()[1].ravel()

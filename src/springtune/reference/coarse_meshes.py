@@ -36,10 +36,10 @@ LARGEST_SAGITTA = 0.15
 PIECE_SAMPLES = 7
 """Points on a piece of an outline at which distances are taken."""
 
-SMALLEST = 1e-9
+LENGTH_TOLERANCE = 1e-9
 """Distance that counts as zero, over the extent of a shape."""
 
-STRAIGHT = 1e-6
+STRAIGHT_TURN = 1e-6
 """Turn of a polygon that counts as zero [rad]."""
 
 SMOOTH_TURN = np.radians(12)
@@ -48,10 +48,10 @@ SMOOTH_TURN = np.radians(12)
 SMALL_TURN = 1e-3
 """Turn of an outline that counts as zero for stresses [rad]."""
 
-RIGHT_ANGLE = np.radians(91)
+UNGRADED_ANGLE = np.radians(91)
 """Largest angle of a corner without supports and loads that needs no grading [rad]."""
 
-FEWEST_ALONG = 4
+LEAST_SIDES_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""
 
 
@@ -252,10 +252,10 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
             # What is farther than its length does not matter.
             near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // PIECE_SAMPLES)
             apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
-            clear = apart > SMALLEST * extent
+            clear = apart > LENGTH_TOLERANCE * extent
             nearest = apart[clear].min(initial=np.inf)
             others = (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf)
-            limit = min(extent / FEWEST_ALONG, ELEMENT_GROWTH * nearest, others)
+            limit = min(extent / LEAST_SIDES_ALONG, ELEMENT_GROWTH * nearest, others)
             if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
                 refined += piece.halves()
             else:
@@ -298,7 +298,7 @@ def outline_mesh(
     extent = float(np.ptp(corners, axis=0).max())
     pieces, placed = [], set()
     for piece in whole:
-        cuts, on_it = _cut(piece.side, points, SMALLEST * extent)
+        cuts, on_it = _cut(piece.side, points, LENGTH_TOLERANCE * extent)
         placed.update(on_it)
         pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
     mesh = _triangulated(shape.name, _refined(pieces, extent, largest_turn), names, extent)
@@ -317,7 +317,7 @@ def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], exten
     """Triangles between pieces of outlines."""
     ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
     # Lengths about 1: netgen's own tolerances are absolute.
-    scale, origin = FEWEST_ALONG / extent, ends.min(axis=(0, 1))
+    scale, origin = LEAST_SIDES_ALONG / extent, ends.min(axis=(0, 1))
     keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
     given = np.empty((len(keys), 2))
     given[places.ravel()] = ends.reshape(-1, 2)
@@ -377,7 +377,7 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
         if len(rows) == len(arriving.get(here, ())) == 1 and keys[rows[0]] == keys[arriving[here][0]]:
             before, there = way[arriving[here][0], 0], way[rows[0], 1]
             one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
-            if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT * (one @ two):
+            if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT_TURN * (one @ two):
                 following[arriving[here][0]] = rows[0]
     pieces = []
     for row in [row for rows in leaving.values() for row in rows if row not in set(following.values())]:
@@ -461,10 +461,10 @@ def corners_of(
         if all(mirrored):
             rough, infinite = abs(angle - np.pi / 2) > SMALL_TURN, angle > np.pi / 2 + SMALL_TURN and not straight
         elif any(mirrored):
-            smooth = any(bare) and (2 * angle < RIGHT_ANGLE or abs(2 * angle - np.pi) <= SMOOTH_TURN)
+            smooth = any(bare) and (2 * angle < UNGRADED_ANGLE or abs(2 * angle - np.pi) <= SMOOTH_TURN)
             rough, infinite = not smooth, any(free) and 2 * angle > np.pi + SMALL_TURN
         else:
-            rough = not (all(bare) and angle < RIGHT_ANGLE)
+            rough = not (all(bare) and angle < UNGRADED_ANGLE)
             infinite = all(free) and angle > np.pi + SMALL_TURN
         what = "the outline has a corner" if same else "supports or loads change at an angle"
         rough = rough and not (same and abs(angle - np.pi) <= SMOOTH_TURN)

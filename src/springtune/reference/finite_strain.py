@@ -32,7 +32,7 @@ from ..problem.materials import Material, Rubber
 from .answers import BeamField
 from .small_strain import ReferenceNotConvergedError
 
-COUNTS = (5, 8)
+ELEMENT_COUNTS = (5, 8)
 """Elements over half the height of the two meshes that are solved; the second is the answer."""
 
 GRADING_POWER = 3
@@ -41,21 +41,21 @@ GRADING_POWER = 3
 TOLERANCE = 1e-6
 """Last step of Newton's method over the displacements; the error that it leaves is about its square, or rounding."""
 
-FARTHEST = 2.0
+LARGEST_STEP = 2.0
 """Largest step of Newton's method over the size of the sheet."""
 
 MAX_ITERATIONS = 10
 
-MOST_LONG = 10
+MOST_ELEMENT_RATIO = 10
 """Most elements along a bent beam over those of half the height: where it is slender, it bends evenly."""
 
 SMALLEST_STEP = 1 / 64
 
-SAME_PATH = 0.01
+PATH_TOLERANCE = 0.01
 """Difference of two meshes' displacements within which they are on the same path."""
 
-BENT = 0.1
-"""As `springtune.mechanics.statics.BENT`."""
+LARGEST_BEND = 0.1
+"""As `springtune.mechanics.statics.LARGEST_BEND`."""
 
 
 class FiniteStrainError(ReferenceNotConvergedError):
@@ -85,11 +85,11 @@ def solve_finite_strain(
     """
     law = law_of(material, plane or material.plane)
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
-    sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
+    sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in ELEMENT_COUNTS]
     name = f"{beam.name}, {material.name}"
     coarse, fine = (sheet.solve(stress, name, watched) for sheet, watched in zip(sheets, (True, False)))
     # The finer mesh may have snapped where the coarser one has not.
-    if not abs(coarse.mean_displacement - fine.mean_displacement) <= SAME_PATH * abs(fine.mean_displacement):
+    if not abs(coarse.mean_displacement - fine.mean_displacement) <= PATH_TOLERANCE * abs(fine.mean_displacement):
         fine = sheets[1].solve(stress, name)
     # Lengths are over half the height.
     lengths = ("displacement", "mean_displacement", "profile", "x", "y", "displacements")
@@ -158,7 +158,7 @@ class Body:
             return True
         # The straight way from rest shortens what turns; the parabola that begins as the linear solution does not.
         bent = 0.25 * (moved - stress * share * self._slope)
-        little = np.linalg.norm(bent) <= BENT * np.linalg.norm(moved)
+        little = np.linalg.norm(bent) <= LARGEST_BEND * np.linalg.norm(moved)
         return bool(len(path) == 1 and little and self._is_stable(0.5 * moved - bent, stress * middle))
 
     def _judged(self, factor: SuperLUFactor, moved: np.ndarray, stress: float) -> bool:
@@ -217,7 +217,7 @@ class Body:
             except SingularError:
                 return None
             step[~self.held] = factor.solve(residual)
-            if not np.abs(step).max() <= FARTHEST * self.extent:
+            if not np.abs(step).max() <= LARGEST_STEP * self.extent:
                 return None
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
@@ -380,7 +380,7 @@ def _element_ends(length: float, count: int, kind: LoadKind) -> tuple[np.ndarray
         half = _spread(near, length / 2, count)
         ends = np.concatenate([half, length - half[-2::-1]])
     else:
-        ends = _spread(near, length, count, None if kind.symmetric else MOST_LONG)
+        ends = _spread(near, length, count, None if kind.symmetric else MOST_ELEMENT_RATIO)
     return ends, 1 - near[::-1] if kind.symmetric else both
 
 

@@ -28,29 +28,29 @@ TOLERANCE = 2e-5
 NODE_SHARE = 0.5
 """Share of the tolerance that the error estimates of nodes may take."""
 
-SAFETY = 3.0
+SAFETY_FACTOR = 3.0
 """Factor on the largest difference at the checks, since tens of checks hardly meet the maximum."""
 
 CHECKS_INSIDE, CHECKS_ON_EDGE = 12, 3
 """Points inside the box and on each edge where solves check an interpolant; corners are nodes."""
 
-SEED = 20
+CHECKS_SEED = 20
 """Seed of the places of these points."""
 
 MOST_NODES = 65
 """Most nodes along an axis."""
 
-JUDGED_WITHIN = 0.05
+LIMITS_TOLERANCE = 0.05
 """Largest relative difference of rotation and strain at the checks.
 
 They jump by a percent, since their grid changes with the aspect ratio.
 """
 
-ROUNDING = 1e-9
+BOX_TOLERANCE = 1e-9
 """How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
 
 
-NAMES = ("displacement", "mean_displacement", "rotation", "strain")
+ANSWER_NAMES = ("displacement", "mean_displacement", "rotation", "strain")
 
 
 class NotCertifiedError(RuntimeError):
@@ -77,10 +77,10 @@ class Interpolant:
     """Answers of the unit problems of one kind of load over a box of aspect ratios and Poisson's ratios.
 
     - `aspect_range`, `nu_range`: First and last aspect ratio and Poisson's ratio [1].
-    - `values` (4, n_aspect, n_nu): At the nodes, last to first, in the order of `NAMES`: logarithms of displacement
-      and mean displacement, of 1 plus rotation over strain (rotation can be zero), and of the strain.
-    - `error_estimate`: Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference
-      at the checks, and the largest error estimate of the solves.
+    - `values` (4, n_aspect, n_nu): At the nodes, last to first, in the order of `ANSWER_NAMES`: logarithms of
+      displacement, mean displacement, 1 plus rotation over strain (rotation can be zero), and strain.
+    - `error_estimate`: Bound on the relative error of each displacement [1]: `SAFETY_FACTOR` times the largest
+      difference at the checks, plus the largest error estimate of the solves.
     - `solves`: Number of unit problems solved, with checks.
     """
 
@@ -114,7 +114,7 @@ class Interpolant:
         """Return the answers at aspect ratios and Poisson's ratios [1], broadcast against each other."""
         aspects, nus = np.broadcast_arrays(np.asarray(aspect_ratio, float), np.asarray(nu, float))
         places = _place(np.log(aspects), np.log(self.aspect_range)), _place(nus, self.nu_range)
-        outside = ~np.all([np.abs(place) <= 1 + ROUNDING for place in places], axis=0)
+        outside = ~np.all([np.abs(place) <= 1 + BOX_TOLERANCE for place in places], axis=0)
         if outside.any():
             asked = f"aspect ratio {aspects[outside].flat[0]:.6g} with nu = {nus[outside].flat[0]:.6g}"
             known = f"aspect ratios {_ends(self.aspect_range)} and nu = {_ends(self.nu_range)}"
@@ -150,7 +150,7 @@ class _Box:
     solver: Callable[..., ReferenceSolution]
 
     def __post_init__(self) -> None:
-        #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
+        #: Answers in the order of `ANSWER_NAMES`, and error estimates, by place in the box (-1 to 1 on each axis).
         self.solved: dict[tuple[float, float], tuple[np.ndarray, float]] = {}
         self.counts = [3 if last > first else 1 for first, last in (self.aspect_range, self.nu_range)]
 
@@ -162,7 +162,7 @@ class _Box:
             answers, estimate = self._solve([(along, across) for along in places[0] for across in places[1]])
             values = _well_behaved(answers).reshape(4, *self.counts)
             promised = [_promised(np.moveaxis(values[:2], axis, 1)) for axis in (1, 2)]
-            goal = (1 - NODE_SHARE) * self.tolerance / SAFETY
+            goal = (1 - NODE_SHARE) * self.tolerance / SAFETY_FACTOR
             if max(promised) <= goal:
                 error_estimate = self._compared(values, checks, estimate)
                 if error_estimate <= self.tolerance:
@@ -176,7 +176,7 @@ class _Box:
 
     def _checks(self) -> list[tuple[float, float]]:
         """Points inside the box and on its edges; of a box without a width along an axis, in the middle of it."""
-        random = np.random.default_rng(SEED)
+        random = np.random.default_rng(CHECKS_SEED)
         inside, edges = random.uniform(-1, 1, (CHECKS_INSIDE, 2)), random.uniform(-1, 1, (4, CHECKS_ON_EDGE))
         points = [(along, across) for along, across in inside]
         points += [(end, at) for end, edge in zip((-1.0, 1.0), edges[:2]) for at in edge]
@@ -197,7 +197,7 @@ class _Box:
                     found = self.solver(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
                 except ReferenceNotConvergedError as error:
                     raise self._failure(str(error)) from error
-                answers = np.array([getattr(found, name) for name in NAMES])
+                answers = np.array([getattr(found, name) for name in ANSWER_NAMES])
                 self.solved[along, across] = answers, found.error_estimate
         found_here = [self.solved[place] for place in places]
         return np.array([answers for answers, _ in found_here]), max(estimate for _, estimate in found_here)
@@ -210,10 +210,10 @@ class _Box:
         places = np.array(checks).T
         along, across = map(lagrange_values, places, values.shape[1:])
         differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _well_behaved(solved)).max(axis=1)
-        if not differences[2:].max() <= JUDGED_WITHIN:
+        if not differences[2:].max() <= LIMITS_TOLERANCE:
             raise self._failure(f"rotation and strain differ by {differences[2:].max():.1e} from those of solves")
         # Differences of logarithms are relative ones.
-        return float(SAFETY * differences[:2].max() + max(estimate, of_checks))
+        return float(SAFETY_FACTOR * differences[:2].max() + max(estimate, of_checks))
 
     def _failure(self, why: str) -> NotCertifiedError:
         over = f"over aspect ratios {_ends(self.aspect_range)} and nu = {_ends(self.nu_range)}"
@@ -225,7 +225,7 @@ def _ends(ends: tuple[float, float]) -> str:
 
 
 def _well_behaved(answers: np.ndarray) -> np.ndarray:
-    """What is interpolated, shape (4, n), of answers in the order of `NAMES`, shape (n, 4)."""
+    """What is interpolated, shape (4, n), of answers in the order of `ANSWER_NAMES`, shape (n, 4)."""
     displacement, mean, rotation, strain = answers.T
     return np.stack([np.log(displacement), np.log(mean), np.log1p(rotation / strain), np.log(strain)])
 
@@ -274,7 +274,7 @@ def _place(values: np.ndarray, ends: ArrayLike) -> np.ndarray:
     first, last = np.asarray(ends, float)
     if last > first:
         return (2 * values - first - last) / (last - first)
-    return np.where(np.abs(values - first) <= ROUNDING * max(1.0, abs(first)), 0.0, np.inf)
+    return np.where(np.abs(values - first) <= BOX_TOLERANCE * max(1.0, abs(first)), 0.0, np.inf)
 
 
 def _between(place: float, ends: ArrayLike) -> float:

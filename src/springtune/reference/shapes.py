@@ -27,22 +27,22 @@ from .triangles import SIDE_CORNERS, function_counts, shape_functions, side_fit,
 LOWEST_DEGREE, HIGHEST_DEGREE = 2, 10
 
 #: Error of a stress that is accepted, over that of other quantities.
-STRESS_SHARE = 10.0
+STRESS_TOLERANCE_FACTOR = 10.0
 
 #: Largest accepted estimate over the tolerance where corners keep their degree, see `Level.kept_degree`.
-LOOSER = 10.0
+KEPT_DEGREE_FACTOR = 10.0
 
 #: Quantities below this share of the largest one of their kind are judged by that share.
-SMALLEST_SHARE = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 
 #: A value of less than so many times the bound on its error is zero as far as can be told.
-TOLD_FROM_ZERO = 10.0
+ZERO_BOUND_FACTOR = 10.0
 
 #: Force on a support at a point, over all of them, that is taken for none.
 SMALLEST_REACTION = 1e-6
 
 #: Most entries of the triangles' matrices on a level: half a gigabyte.
-LARGEST_LEVEL = 60_000_000
+MOST_LEVEL_ENTRIES = 60_000_000
 
 #: Layers at corners, from none, whose triangles are looked at before: those of later ones have the same form.
 LAYERS_CHECKED = 4
@@ -135,7 +135,7 @@ def solve_shape(
     bounds: dict[str, float] = {}
     complaint = ""
     for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
-        if complaint and problem.size(degree) > LARGEST_LEVEL:
+        if complaint and problem.size(degree) > MOST_LEVEL_ENTRIES:
             complaint += "; the next level would not fit into memory: a simpler outline has fewer triangles"
             break
         level = (level_of or Level)(problem, degree)
@@ -146,14 +146,14 @@ def solve_shape(
         problem.look_at_reactions(level)
         for name in names + ([] if problem.infinite_energy else [""]):
             kind = problem.kinds[name]
-            scale = max(abs(values[-1][name]), SMALLEST_SHARE * level.scale(kind)) or 1.0
+            scale = max(abs(values[-1][name]), NEGLIGIBLE_SHARE * level.scale(kind)) or 1.0
             before, last = (abs(values[i][name] - values[i - 1][name]) / scale for i in (-2, -1))
             estimates[name] = max(last, before / 4) + level.round_off
-            accepted = tolerance * (STRESS_SHARE if kind == "stress" else 1.0)
+            accepted = tolerance * (STRESS_TOLERANCE_FACTOR if kind == "stress" else 1.0)
             if kept := level.kept_degree:
                 of_full = [one[name] for one in values[: kept - LOWEST_DEGREE + 1]]
                 estimates[name] += 2 * float(np.abs(np.diff(of_full[-3:])).max()) / scale
-                accepted = max(accepted, LOOSER * tolerance)
+                accepted = max(accepted, KEPT_DEGREE_FACTOR * tolerance)
             bounds[name] = estimates[name] * scale
             why = unmet(estimates[name], accepted, before, last)
             if why and not complaint:
@@ -163,9 +163,9 @@ def solve_shape(
         if not complaint:
             rotation, strain = level.rotation_and_strain()
             found = {name: values[-1][name] for name in names}
-            least = {name: SMALLEST_SHARE * level.scale(problem.kinds[name]) for name in names}
+            least = {name: NEGLIGIBLE_SHARE * level.scale(problem.kinds[name]) for name in names}
             return ShapeReference(
-                {name: one if abs(one) > TOLD_FROM_ZERO * bounds[name] else 0.0 for name, one in found.items()},
+                {name: one if abs(one) > ZERO_BOUND_FACTOR * bounds[name] else 0.0 for name, one in found.items()},
                 {name: estimates[name] for name in names},
                 energy=values[-1][""],
                 rotation=rotation,

@@ -44,23 +44,23 @@ ELEMENT_GROWTH = 3.0
 
 #: Extended precision, in which elements and residuals are evaluated: 64 bits of mantissa on x86, 53 where a platform
 #: has no more; estimates of rounding follow.
-EXTENDED = np.longdouble
+EXTENDED_DTYPE = np.longdouble
 
 #: Relative rounding of a displacement from which on a solution is not refined any more.
-REFINED_UNTIL = 5e-14
+REFINED_ROUNDING = 5e-14
 
 #: Most corrections of a solution.
-CORRECTIONS = 40
+MOST_CORRECTIONS = 40
 
 #: Error of a displacement from the twelve digits of a unit problem's aspect ratio, at most its third power, relative.
-SHARED = 2e-12
+ASPECT_ROUNDING = 2e-12
 
 #: Largest ratio of the sides of a body that bends, see `_most_slender`. Beyond some ratio the corrections do not
 #: converge; which one depends on the processor's arithmetic. On all that were tried it is at least 15 % above this one.
-MOST_BENT = 7000.0
+MOST_BENT_RATIO = 7000.0
 
 #: What is added to the diagonal of a matrix before it is factorized, relative.
-SHIFT = 1e-15
+DIAGONAL_SHIFT = 1e-15
 
 #: Number of points of the field that is handed out, about.
 FIELD_POINTS = 3000
@@ -69,7 +69,7 @@ FIELD_POINTS = 3000
 _Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
 
 
-FOR_BEAM_THEORY = "such slender shapes are for beam theory"
+SLENDER_REASON = "such slender shapes are for beam theory"
 
 
 class ReferenceNotConvergedError(RuntimeError):
@@ -158,19 +158,19 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
         where = f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative"
         if slenderness > (most := _most_slender(nu, degree)) * (1 + 1e-9):  # the ratio is rounded
             why = f"is unknown at level {degree} if a body that bends has sides of more than {most:.0f} : 1"
-            raise ReferenceNotConvergedError(f"{where} rounding error {why}; {FOR_BEAM_THEORY}")
+            raise ReferenceNotConvergedError(f"{where} rounding error {why}; {SLENDER_REASON}")
         level = UnitLevel(2 * aspect_ratio, nu, degree, kind)  # in half heights
         at = f"at level {degree} ({level.unknowns} unknowns)"
         if not level.round_off <= tolerance:
             missed = f"rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}"
-            raise ReferenceNotConvergedError(f"{where} {missed}; {FOR_BEAM_THEORY}")
+            raise ReferenceNotConvergedError(f"{where} {missed}; {SLENDER_REASON}")
         values.append(level.displacement)
         middle, middle_before = level.measured, middle
         if len(values) < 3:
             continue
         before, last = np.abs(np.diff(values[-3:])) / level.displacement
         # The middle of a pressed side is no energy: its own step counts, too.
-        estimate = float(max(last, abs(middle - middle_before) / middle) + level.round_off + SHARED)
+        estimate = float(max(last, abs(middle - middle_before) / middle) + level.round_off + ASPECT_ROUNDING)
         if estimate <= tolerance and (last <= before / 2 or before <= level.round_off):
             return level, estimate
     missed = f"error estimate {estimate:.1e} {at}, the last one"
@@ -189,7 +189,7 @@ def _most_slender(nu: float, degree: int) -> float:
 
     Small elements, and stiff shear as nu tends to -1, worsen the condition of the matrix too.
     """
-    return MOST_BENT * min(1.0, 2 * (1 + nu)) ** 0.5 * (2 / 3) ** max(degree - 6, 0)
+    return MOST_BENT_RATIO * min(1.0, 2 * (1 + nu)) ** 0.5 * (2 / 3) ** max(degree - 6, 0)
 
 
 class UnitLevel:
@@ -269,8 +269,8 @@ class _Grid:
 
     def _along_force(self, part: np.ndarray) -> np.ndarray:
         """Values of all unknowns, of which those across the force are zero."""
-        first = np.zeros(self._split, EXTENDED)
-        second = np.zeros(len(self._unknowns[1][0]) * len(self._unknowns[1][1]), EXTENDED)
+        first = np.zeros(self._split, EXTENDED_DTYPE)
+        second = np.zeros(len(self._unknowns[1][0]) * len(self._unknowns[1][1]), EXTENDED_DTYPE)
         (first, second)[self._kind.axis][:] = part
         return np.concatenate([first, second])
 
@@ -293,23 +293,23 @@ class _Grid:
 
     def solve(self, nu: float) -> tuple[np.ndarray, float, float | None, float]:
         """Unknowns for a Poisson's ratio, energy, displacement of a pressed side's middle if any, rounding."""
-        one = EXTENDED(1)
+        one = EXTENDED_DTYPE(1)
         direct, shear = one / (1 - one * nu * nu), one / (2 * (1 + one * nu))
         matrix = float(direct) * (self._direct + nu * self._lateral) + float(shear) * self._shear
         # Rounding must not make the factor of a slender beam an indefinite one.
-        factor, load = factorize(matrix + SHIFT * diags_array(matrix.diagonal())), self.load
-        solution = factor.solve(load.astype(float)).astype(EXTENDED)
+        factor, load = factorize(matrix + DIAGONAL_SHIFT * diags_array(matrix.diagonal())), self.load
+        solution = factor.solve(load.astype(float)).astype(EXTENDED_DTYPE)
         # Roundings of a term: entries, products along x and y there and back, moduli, sums and the load.
-        unit = (8 * self._x.degree + 30) * float(np.finfo(EXTENDED).eps)
+        unit = (8 * self._x.degree + 30) * float(np.finfo(EXTENDED_DTYPE).eps)
         direction, before, norm, softest = 0.0, np.inf, 0.0, 1.0
-        for _ in range(CORRECTIONS):
+        for _ in range(MOST_CORRECTIONS):
             forces, work = self._forces(solution, direct, nu, shear)
             residual = load - forces
             correction = factor.solve(residual.astype(float))
             gain, size = residual @ correction, load @ solution
             lacking = 2 * abs(float(gain / size / softest))
             rounding = float(unit * work / size)
-            enough = max(REFINED_UNTIL, rounding)
+            enough = max(REFINED_ROUNDING, rounding)
             if not lacking > enough:
                 break
             turn = gain / before
@@ -323,7 +323,7 @@ class _Grid:
             return refined, energy, None, round_off
         # Not the energy: its error is the rounded forces' work on the displacements under a unit force there.
         measured = float(self.middle @ refined)
-        _, work = self._forces(solution, direct, nu, shear, factor.solve(self.middle).astype(EXTENDED))
+        _, work = self._forces(solution, direct, nu, shear, factor.solve(self.middle).astype(EXTENDED_DTYPE))
         return refined, energy, measured, max(round_off, float(unit * work / measured))
 
     def _forces(
@@ -409,14 +409,14 @@ class _Line:
         self.all = np.arange(count * degree + 1)
         self.first, self.last = self.all[0], self.all[-1]
         # Of values and slopes, on an element from -1 to 1, the coefficients of Legendre polynomials.
-        self._value, slope = np.zeros((2, size, size), EXTENDED)
+        self._value, slope = np.zeros((2, size, size), EXTENDED_DTYPE)
         self._value[:2, :2] = [[0.5, -0.5], [0.5, 0.5]]
         slope[:2, 0] = [-0.5, 0.5]
         for k in range(2, size):
-            norm = np.sqrt(EXTENDED(2 * k - 1) / 2)
+            norm = np.sqrt(EXTENDED_DTYPE(2 * k - 1) / 2)
             self._value[k, [k, k - 2]] = norm / (2 * k - 1), -norm / (2 * k - 1)
             slope[k, k - 1] = norm
-        half = np.diff(points.astype(EXTENDED)) / 2
+        half = np.diff(points.astype(EXTENDED_DTYPE)) / 2
         # The same of the whole line, element after element, and the integrals of the polynomials' squares.
         terms = np.repeat(np.arange(count * size).reshape(count, 1, size), size, axis=1).ravel()
         numbers = np.repeat(self._numbers, size)
@@ -425,7 +425,7 @@ class _Line:
             csr_array((np.multiply.outer(by, of).ravel(), (terms, numbers)), shape=(count * size, len(self.all)))
             for by, of in ((ones, self._value), (1 / half, slope))
         ]
-        self.weights = np.multiply.outer(half, 2 / (2 * np.arange(size, dtype=EXTENDED) + 1)).ravel()
+        self.weights = np.multiply.outer(half, 2 / (2 * np.arange(size, dtype=EXTENDED_DTYPE) + 1)).ravel()
         weighted = [self.weights[:, None] * of.toarray() for of in (value, slope)]
         self.mass, self.slope, self.mixed = (
             np.asarray(of.T @ by, float)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..problem.rubber import CHECKED, TensileTest, TestDataError, check_terms, fit, told
+from ..problem.rubber import CHECKED_STRETCHES, TensileTest, TestDataError, check_terms, fit, told
 
 LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""
@@ -46,7 +46,7 @@ class SpringLaw:
         q = test.stretch
         columns = np.stack([q - q**-power for power in LAW_POWERS[:terms]], axis=1)
         law = cls(fit(columns, test), float(q.max()))
-        if not (np.diff(law.pull(np.linspace(1, q.max(), CHECKED))) > 0).all():
+        if not (np.diff(law.pull(np.linspace(1, q.max(), CHECKED_STRETCHES))) > 0).all():
             raise TestDataError(f"{test.name}: the law of {terms} terms is unstable; give another number of terms")
         return law
 
