@@ -278,7 +278,7 @@ def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkey
     assert "10.vtu is 100 x 80 mm, and 5.vtu 100 x 40 mm; give files of one body and unit" in refusal(text)
 
 
-@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.filterwarnings("always::springtune.problem.geometry.AssumptionWarning")  # several commands, one process
 @pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 m"}, False), ({"unit": "1 mm"}, False)])
 def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
     """A file in mm that is read in m."""
