@@ -21,19 +21,6 @@ ROWS = 20
 COMPARED = ("before", "after")
 
 
-def tolerance(context: click.Context, parameter: click.Parameter, given: str | None) -> float | None:
-    """Read a tolerance: a finite number, not below zero."""
-    if given is None:
-        return None
-    try:
-        number = float(given)
-    except ValueError:
-        number = math.nan
-    if not (math.isfinite(number) and number >= 0):
-        raise click.BadParameter(f"'{given}' is no tolerance; give a number such as 1e-6, or 0")
-    return number
-
-
 @click.command(
     epilog=examples(
         "springtune diff results/before results/mine",
@@ -42,9 +29,11 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 )
 @click.argument("before")
 @click.argument("after")
-@click.option("--relative", callback=tolerance, help="Tolerance of the larger number.  [default: 1e-6]")
 @click.option(
-    "--absolute", callback=tolerance, help="Tolerance in SI units.  [default: 0; of numbers without unit, --relative]"
+    "--relative", type=click.FloatRange(0), default=1e-6, show_default=True, help="Tolerance of the larger number."
+)
+@click.option(
+    "--absolute", type=click.FloatRange(0), help="Tolerance in SI units.  [default: 0; without unit, --relative]"
 )
 @click.option("--group", "groups", multiple=True, help="Group to compare, such as sensitivity; all without.")
 @click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
@@ -52,7 +41,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 def diff(
     before: str,
     after: str,
-    relative: float | None,
+    relative: float,
     absolute: float | None,
     groups: tuple[str, ...],
     ignored: tuple[str, ...],
@@ -68,7 +57,7 @@ def diff(
     Exit codes: 0 nothing changed, 1 something changed, 2 nothing could be compared.
     """
     from ..studies.output import reading
-    from ..studies.output.comparison import RELATIVE, Tolerance, compare
+    from ..studies.output.comparison import Tolerance, compare
 
     try:
         paths = [reading.dataset_file(before), reading.dataset_file(after)]
@@ -77,7 +66,7 @@ def diff(
             reading.open(paths[1]) as other,
             reading.guarded(f"{paths[0]}, {paths[1]}"),
         ):
-            given = Tolerance(RELATIVE if relative is None else relative, absolute)
+            given = Tolerance(relative, absolute)
             found = compare(one, other, given, groups, ignored, rows)
             click.echo(comparison_text(found, paths, rows))
     except (OSError, ValueError) as error:

@@ -239,7 +239,7 @@ def test_a_section_that_computes_needs_no_grid(load, refusal, key):
     if key == "samples":
         assert load(yaml.safe_dump(content)).parts["samples"]
     else:
-        assert "'beams' is missing; give a section for each beam" in refusal(yaml.safe_dump(content))
+        assert "; or declare it under beams" in refusal(yaml.safe_dump(content))
 
 
 def test_missing_file_and_folder(tmp_path):

@@ -250,13 +250,11 @@ Numbers = Annotated[OneOrMore[Item], Field(json_schema_extra=_or_range), WrapVal
 """Numbers: one, a list, or a range."""
 
 DefinitionNames = OneOrMore[DefinitionName]
-Lengths = Annotated[Numbers[Length], Field(title="a length such as '5 mm', a list, or a range")]
-Forces = Annotated[Numbers[Force], Field(title="a force such as '400 kN', a list, or a range")]
-Stresses = Annotated[Numbers[Stress], Field(title="a stress such as '210 GPa', a list, or a range")]
-PoissonRatios = Annotated[
-    Numbers[PoissonRatio], Field(title="a number above -1 and at most 0.5, such as 0.3, a list, or a range")
-]
-Ratios = Annotated[Numbers[Ratio], Field(title="a number above 0, a list, or a range")]
+Lengths = Numbers[Length]
+Forces = Numbers[Force]
+Stresses = Numbers[Stress]
+PoissonRatios = Numbers[PoissonRatio]
+Ratios = Numbers[Ratio]
 BeamForces = Annotated[
     Annotated[Forces, Tag("of all")] | Annotated[dict[BeamName, Forces], Field(min_length=1), Tag("of each")],
     Discriminator(lambda value: "of each" if isinstance(value, dict) and not RANGE_KEYS & value.keys() else "of all"),

@@ -87,7 +87,7 @@ class StudyKind:
     name: str  # of its package, and of its part of a study
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)  # keys it adds: type and pydantic field
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    alone: dict[str, tuple[str, ...]] = field(default_factory=dict)  # keys instead of grids, and what each needs
+    alone: tuple[str, ...] = ()  # keys that a study may have instead of grids; by default its optional keys
     reads: tuple[str, ...] = ()  # other keys of a study that it reads
     files: Callable[[Any], Iterable[Path]] = lambda part: ()  # further input files
     check: Callable[[Any, Problems], None] = lambda config, problems: None

@@ -117,10 +117,12 @@ def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
 def words(annotation: Any) -> str:
     """Words for a value of a field or type: its title, or a description."""
     if isinstance(annotation, FieldInfo):
-        return annotation.title or words(annotation.annotation)
+        return annotation.title or words(Annotated[annotation.annotation, "a field", *annotation.metadata])
     origin, (inside, *notes) = get_origin(annotation), get_args(annotation) or (None,)
     if origin is Annotated:
-        return next((note.title for note in notes if isinstance(note, FieldInfo) and note.title), words(inside))
+        found = next((note.title for note in notes if isinstance(note, FieldInfo) and note.title), words(inside))
+        is_range = any(isinstance(note, OrSection) for note in notes)
+        return found.replace(", or a list", ", a list, or a range") if is_range else found
     if origin in (Union, UnionType):
         return words(inside)
     if origin is list:

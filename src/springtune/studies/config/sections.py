@@ -375,25 +375,18 @@ class StudyConfig(Section):
 
     grids: dict[str, GridConfig] = Field({})
 
-    alone: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """Keys of study kinds that a study may have instead of grids, and the keys that each needs."""
+    alone: ClassVar[list[str]] = []
+    """Keys of study kinds that a study may have instead of grids."""
 
     @model_validator(mode="before")
     @classmethod
     def _check_sections(cls, value: Any) -> Any:
-        """Refuse a study without grids or a section that may replace them, or without what these need."""
-        if not isinstance(value, dict):
-            return value
-        ways = {"grids": GRIDS_NEED} | cls.alone
-        given = {key for key, content in value.items() if content is not None}
-        needed = {name for way in given & {*ways} for name in ways[way]} if given & {*ways} else {"grids"}
-        for name in sorted(needed - given if given <= {*cls.model_fields} else ()):
-            others = f", or {', '.join(map(repr, cls.alone))}" if name == "grids" else ""
-            raise refuse(f"'{name}' is missing; give {words(cls.model_fields[name])}{others}", name)
+        """Refuse a study without grids or a section that may replace them."""
+        given = {key for key, content in value.items() if content is not None} if isinstance(value, dict) else set()
+        if given and given <= {*cls.model_fields} - {"grids", *cls.alone}:
+            others = ", ".join(map(repr, cls.alone))
+            raise refuse(f"'grids' is missing; give {words(cls.model_fields['grids'])}, or {others}", "grids")
         return value
-
-
-GRIDS_NEED = ("beams", "materials")
 
 
 @cache
@@ -403,10 +396,9 @@ def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     own: dict[str, Any] = {name: field for kind in kinds for name, field in kind.grid_fields.items()}
     grid = create_model("GridConfig", __base__=GridConfig, __doc__=GridConfig.__doc__, **own)
     added: dict[str, Any] = {name: field for kind in kinds for name, field in kind.study_fields.items()}
-    alone: dict[str, tuple[str, ...]] = {}
+    alone: list[str] = []
     for kind in kinds:
-        optional_keys = (name for name, (_, field) in kind.study_fields.items() if field.default is None)
-        alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
+        alone += kind.alone or [name for name, (_, field) in kind.study_fields.items() if field.default is None]
     meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in made)
     added["outputs"] = (
         OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]],
@@ -428,8 +420,7 @@ def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     )
     model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
     model.alone = alone
-    ways = {"grids": GRIDS_NEED} | alone
-    model.model_config["json_schema_extra"] = {"anyOf": [{"required": [*needed, key]} for key, needed in ways.items()]}
+    model.model_config["json_schema_extra"] = {"anyOf": [{"required": [key]} for key in ("grids", *alone)]}
     return model
 
 

@@ -87,7 +87,7 @@ def _files(found):
 KIND = StudyKind(
     "bodies",
     study_fields={"shapes": SHAPES_KEY, "shape_grids": SHAPE_GRIDS_KEY},
-    alone={"shape_grids": ("shapes", "materials")},
+    alone=("shape_grids",),
     reads=("grids",),
     files=_files,
     check=_check,

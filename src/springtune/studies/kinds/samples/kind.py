@@ -333,7 +333,6 @@ def _tables(study):
 KIND = StudyKind(
     "samples",
     study_fields={"samples": optional(SamplesConfig, "Sampled scenes: groups `/samples` and `/sobol`.")},
-    alone={"samples": ()},
     check=_check,
     expand=_expand,
     axes=lambda sample: {"load": set(sample.loads), "definition": set(sample.definitions)},
