@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -86,12 +87,11 @@ class GroupChanges:
     """Changes of a group; `labels` and `cells` are those of only one dataset, `sizes` count the labels of both."""
 
     name: str
-    sizes: dict[str, int]
-    units: dict[str, str]
-    labels: dict[str, tuple[list[str | float], ...]]
+    variables: tuple[list[str], ...]
+    sizes: dict[str, int] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    labels: dict[str, tuple[list[str | float], ...]] = field(default_factory=dict)
     cells: tuple[Alone, ...] = (Alone(), Alone())
-    both: int = 0
-    variables: tuple[list[str], ...] = ([], [])
     unlike: dict[str, str] = field(default_factory=dict)
     flags: list[VariableChanges] = field(default_factory=list)
     values: list[VariableChanges] = field(default_factory=list)
@@ -158,16 +158,13 @@ def compare(
         raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
     roots = [side["/"] for side in nodes]
     chosen = [[path for path in side if path in wanted] for side in nodes]
-    found = [
-        _Group(path, [side[path] for side in nodes], roots, tolerance or Tolerance(), most).compared(left_out)
-        for path in chosen[0]
-        if path in chosen[1]
-    ]
+    both = {path: [side[path] for side in nodes] for path in chosen[0] if path in chosen[1]}
+    found = [_compare_group(one, pair, roots, left_out, tolerance or Tolerance(), most) for one, pair in both.items()]
     facts = [_facts(tree.attrs) for tree in (before, after)]
-    told = {name: (facts[0].get(name, ""), facts[1].get(name, "")) for name in facts[0] | facts[1]}
+    noted = {name: (facts[0].get(name, ""), facts[1].get(name, "")) for name in facts[0] | facts[1]}
     inputs = [from_json(tree.attrs.get("inputs")) for tree in (before, after)]
-    told |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
-    return Comparison(found, _only(chosen), {name: (old, new) for name, (old, new) in told.items() if old != new})
+    noted |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
+    return Comparison(found, _only(chosen), {name: pair for name, pair in noted.items() if pair[0] != pair[1]})
 
 
 def _rounded(data: xr.Dataset) -> xr.Dataset:
@@ -192,117 +189,108 @@ def _facts(attributes: Mapping[Hashable, object]) -> dict[str, str]:
     return {name: str(value) for name, value in found.items() if name not in UNTOLD}
 
 
-class _Group:
-    """Comparison of a group that both datasets have."""
+def _compare_group(
+    path: str,
+    given: Sequence[xr.Dataset],
+    roots: Sequence[xr.Dataset],
+    left_out: Collection[str],
+    tolerance: Tolerance,
+    most: int | None,
+) -> GroupChanges:
+    """Compare labels, cells and all variables of a group but those that are left out."""
+    numbers = [{name: range(size) for name, size in one.sizes.items() if name not in one.indexes} for one in given]
+    pair = [data.reset_coords().assign_coords(number) for data, number in zip(given, numbers)]
+    asked = [_asked(data, root) for data, root in zip(pair, roots)]
+    dimensions = _cell_dimensions(given, roots)
+    names = [[str(name) for name in data.data_vars if name not in left_out] for data in pair]
+    found = GroupChanges(path, variables=_only(names))
+    for name in dict.fromkeys(str(name) for data in pair for name in data.dims):
+        axes = [data.indexes[name] for data in pair if name in data.dims]
+        axis, other = axes[0], axes[-1]
+        found.sizes[name] = len(axis.union(other, sort=False))
+        found.units[name] = next(str(data[name].attrs.get("units", "1")) for data in pair if name in data.dims)
+        alone = axis.difference(other, sort=False).tolist(), other.difference(axis, sort=False).tolist()
+        if any(alone) and all(data.sizes[name] and name in data.indexes for data in given):
+            found.labels[name] = alone
+    if all("status" in data for data in pair) and not _why_unlike(*(data["status"] for data in pair)):
+        found.cells = _cells_of_one(asked, dimensions, most)
+    both: tuple[Any, ...] = xr.align(*pair, *asked, join="inner", copy=False)
+    one, other, *masks = both
+    for name in (name for name in names[0] if name in names[1]):
+        if reason := _why_unlike(one[name], other[name]):
+            found.unlike[name] = reason
+            continue
+        changes = found.flags if is_flagged(one[name]) else found.values
+        changes.append(_compare_variable(path, one[name], other[name], masks, dimensions, tolerance, most))
+    return found
 
-    def __init__(
-        self,
-        path: str,
-        pair: Sequence[xr.Dataset],
-        roots: Sequence[xr.Dataset],
-        tolerance: Tolerance,
-        most: int | None,
-    ) -> None:
-        self.path, self.given, self.tolerance, self.most = path, pair, tolerance, most
-        self.cell_dimensions = _cell_dimensions(pair, roots)
-        numbered = [{name: range(size) for name, size in one.sizes.items() if name not in one.indexes} for one in pair]
-        self.pair = [data.assign_coords(numbers) for data, numbers in zip(pair, numbered)]
-        self.asked = [_asked(data, root) for data, root in zip(self.pair, roots)]
 
-    def compared(self, left_out: Collection[str]) -> GroupChanges:
-        """Compare labels, cells and all variables but some."""
-        sizes = {str(name): size for one in self.pair for name, size in one.sizes.items()}
-        units: dict[str, str] = {}
-        labels: dict[str, tuple[list[str | float], ...]] = {}
-        for name in sizes:
-            axes = [data[name] for data in self.pair if name in data.dims]
-            sizes[name] = len(axes[0].to_index().union(axes[-1].to_index(), sort=False))
-            units[name] = str(axes[0].attrs.get("units", "1"))
-            if len(axes) == 2 and all(data.sizes[name] and name in data.indexes for data in self.given):
-                one, other = (axis.to_index() for axis in axes)
-                alone = one.difference(other, sort=False).tolist(), other.difference(one, sort=False).tolist()
-                labels |= {name: alone} if any(alone) else {}
-        found = GroupChanges(self.path, sizes, units, labels)
-        names = [
-            [str(name) for name in data.variables if name not in data.dims and name not in left_out]
-            for data in self.pair
-        ]
-        found.variables = _only(names)
-        if all("status" in data for data in self.pair) and not self._unlike("status"):
-            found.cells, found.both = self._cells()
-        for name in (name for name in names[0] if name in names[1]):
-            if reason := self._unlike(name):
-                found.unlike[name] = reason
-                continue
-            (found.flags if is_flagged(self.pair[0][name]) else found.values).append(self._variable(name))
-        return found
+def _why_unlike(one: xr.DataArray, other: xr.DataArray) -> str:
+    """Return why two variables cannot be compared, or an empty string."""
+    if set(one.dims) != set(other.dims):
+        sides = (f"({', '.join(map(str, side.dims))})" for side in (one, other))
+        return "has other dimensions: {} before, {} after".format(*sides)
+    if (one.dtype.kind in "OUS") != (other.dtype.kind in "OUS"):
+        return "is a text in one dataset and a number in the other"
+    units = [str(side.attrs["units"]) for side in (one, other) if "units" in side.attrs]
+    return f"has other units: {units[0]} before, {units[1]} after" if len(set(units)) > 1 else ""
 
-    def _unlike(self, name: str) -> str:
-        """Return why a variable cannot be compared, or an empty string."""
-        a, b = (data[name] for data in self.pair)
-        if set(a.dims) != set(b.dims):
-            said = (f"({', '.join(map(str, one.dims))})" for one in (a, b))
-            return "has other dimensions: {} before, {} after".format(*said)
-        if (a.dtype.kind in "OUS") != (b.dtype.kind in "OUS"):
-            return "is a text in one dataset and a number in the other"
-        units = [str(one.attrs["units"]) for one in (a, b) if "units" in one.attrs]
-        return f"has other units: {units[0]} before, {units[1]} after" if len(set(units)) > 1 else ""
 
-    def _cells(self) -> tuple[tuple[Alone, ...], int]:
-        """Cells requested by one side only, and the number requested by both."""
-        masks = [mask for mask in self.asked if mask is not None]
-        masks = [mask.any([name for name in mask.dims if name not in self.cell_dimensions]) for mask in masks]
-        alone, both = [], 0
-        for mask, other in zip(masks, masks[::-1]):
-            # On the labels of one side: the union of all may be the square of either.
-            there = other.reindex_like(mask, fill_value=False).transpose(*mask.dims).values
-            places = np.flatnonzero(mask.values & ~there)
-            rows = [_labels(mask, np.unravel_index(place, mask.shape)) for place in places[: self.most]]
-            alone.append(Alone(len(places), rows))
-            both = int((mask.values & there).sum())
-        return tuple(alone), both
+def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int | None) -> tuple[Alone, ...]:
+    """Cells that only one side requests, of each side."""
+    masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
+    alone = []
+    for mask, other in zip(masks, masks[::-1]):
+        # On the labels of one side: the union of all may be the square of either.
+        there = other.reindex_like(mask, fill_value=False).transpose(*mask.dims).values
+        places = np.flatnonzero(mask.values & ~there)
+        rows = [_labels(mask, np.unravel_index(place, mask.shape)) for place in places[:most]]
+        alone.append(Alone(len(places), rows))
+    return tuple(alone)
 
-    def _variable(self, name: str) -> VariableChanges:
-        """Compare a variable on the labels of both sides; of a curve or field its worst point."""
-        names = sorted(map(str, self.pair[0][name].dims), key=lambda one: one not in self.cell_dimensions)
-        arrays = (_bare(data[name]).transpose(*names) for data in self.pair)
-        one, other = xr.align(*arrays, join="inner", copy=False)
-        if not one.size:
-            return VariableChanges(name, 0, 0, [])
-        flagged = is_flagged(one) and is_flagged(other)
-        a, b = (_as_words(side) if flagged else side.values for side in (one, other))
-        texts = flagged or one.dtype.kind in "OUS"
-        missing = [values == "" if texts else np.isnan(values) for values in (a, b)]
-        asked = [_on(mask, one) for mask in self.asked]
-        unmatched = (missing[0] & ~missing[1] & asked[0]) | (missing[1] & ~missing[0] & asked[1])
-        both = ~missing[0] & ~missing[1]
-        differ = both & (a != b)
-        excess = np.where(unmatched, np.inf, 0.0)
-        points = tuple(range(sum(one in self.cell_dimensions for one in names), one.ndim))
-        units = str(one.attrs.get("units", other.attrs.get("units", "1")))
-        if texts:
-            excess[differ] = [_of_texts(str(x), str(y), self.tolerance.relative) for x, y in zip(a[differ], b[differ])]
-        elif differ.any():
-            excess[differ] = _of_numbers(a, b, both, points, units, self.tolerance)[differ]
-        length = math.prod(one.shape[axis] for axis in points)
-        beyond = np.flatnonzero(excess > 1.0)
-        found = pd.DataFrame({"place": beyond, "cell": beyond // length, "excess": excess.ravel()[beyond]})
-        worst = found.sort_values("excess", ascending=False, kind="stable").drop_duplicates("cell")
-        said = str if texts else float
-        rows = [
-            Change(
-                self.path,
-                name,
-                _labels(one, np.unravel_index(place, one.shape)),
-                said(a.flat[place]),
-                said(b.flat[place]),
-                units,
-                over,
-            )
-            for place, over in worst[["place", "excess"]][: self.most].itertuples(index=False)
-        ]
-        compared = (both | unmatched).reshape(-1, length).any(axis=1).sum()
-        return VariableChanges(name, int(compared), len(worst), rows)
+
+def _compare_variable(
+    group: str,
+    one: xr.DataArray,
+    other: xr.DataArray,
+    asked: Sequence[xr.DataArray],
+    dimensions: set[str],
+    tolerance: Tolerance,
+    most: int | None,
+) -> VariableChanges:
+    """Compare a variable with common labels; of a curve or field its worst point."""
+    names = sorted(map(str, one.dims), key=lambda name: name not in dimensions)
+    one, other = one.transpose(*names), other.transpose(*names)
+    name = str(one.name)
+    if not one.size:
+        return VariableChanges(name, 0, 0, [])
+    flagged = is_flagged(one) and is_flagged(other)
+    a, b = (_as_words(side) if flagged else side.values for side in (one, other))
+    texts = flagged or one.dtype.kind in "OUS"
+    missing = [values == "" if texts else np.isnan(values) for values in (a, b)]
+    of_both = [mask.any([dim for dim in mask.dims if dim not in names]).broadcast_like(one) for mask in asked]
+    masks = [mask.transpose(*names).values for mask in of_both]
+    unmatched = (missing[0] & ~missing[1] & masks[0]) | (missing[1] & ~missing[0] & masks[1])
+    both = ~missing[0] & ~missing[1]
+    differ = both & (a != b)
+    excess = np.where(unmatched, np.inf, 0.0)
+    points = tuple(range(sum(name in dimensions for name in names), one.ndim))
+    units = str(one.attrs.get("units", other.attrs.get("units", "1")))
+    if texts:
+        excess[differ] = [_excess_of_texts(str(x), str(y), tolerance.relative) for x, y in zip(a[differ], b[differ])]
+    elif differ.any():
+        excess[differ] = _excess_of_numbers(a, b, both, points, units, tolerance)[differ]
+    length = math.prod(one.shape[axis] for axis in points)
+    beyond = np.flatnonzero(excess > 1.0)
+    found = pd.DataFrame({"place": beyond, "cell": beyond // length, "excess": excess.ravel()[beyond]})
+    worst = found.sort_values("excess", ascending=False, kind="stable").drop_duplicates("cell")
+    value = str if texts else float
+    rows = []
+    for place, over in worst[["place", "excess"]][:most].itertuples(index=False):
+        labels = _labels(one, np.unravel_index(place, one.shape))
+        rows.append(Change(group, name, labels, value(a.flat[place]), value(b.flat[place]), units, over))
+    compared = (both | unmatched).reshape(-1, length).any(axis=1).sum()
+    return VariableChanges(name, int(compared), len(worst), rows)
 
 
 def _cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
@@ -316,30 +304,16 @@ def _cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) ->
     return set(map(str, found))
 
 
-def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
-    """Requested cells of a group by its or the root's status; None without one."""
+def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray:
+    """Requested cells of a group by its or the root's status, on the group's labels; true without a status."""
     status = next((one["status"] for one in (data, root) if "status" in one.data_vars), None)
     if status is None:
-        return None
+        return xr.DataArray(True)
     words = flag_words(status) if is_flagged(status) else {0: NOT_REQUESTED}
     silent = [value for value, word in words.items() if word == NOT_REQUESTED]
-    return _bare(~status.isin([*silent, np.nan]).compute())
-
-
-def _on(mask: xr.DataArray | None, array: xr.DataArray) -> np.ndarray:
-    """Mask on the labels of an array, broadcastable to it; true without a common dimension."""
-    shared = [name for name in array.dims if mask is not None and name in mask.dims]
-    if mask is None or not shared:
-        return np.array(True)
-    mask = mask.any([name for name in mask.dims if name not in shared])
-    mask = mask.reindex({name: array.indexes[name] for name in shared}, fill_value=False)
-    values: np.ndarray = mask.broadcast_like(array).transpose(*array.dims).values
-    return values
-
-
-def _bare(array: xr.DataArray) -> xr.DataArray:
-    """An array with the labels of its dimensions alone."""
-    return array.drop_vars(set(array.coords) - set(array.dims))
+    mask = ~status.reset_coords(drop=True).isin([*silent, np.nan]).compute()
+    mask = mask.any([name for name in mask.dims if name not in data.dims])
+    return mask.reindex({name: data.indexes[name] for name in mask.dims}, fill_value=False)
 
 
 def _labels(array: xr.DataArray, place: Iterable[int]) -> Labels:
@@ -355,7 +329,7 @@ def _as_words(array: xr.DataArray) -> np.ndarray:
     return np.array(said, dtype=object)[back.ravel()].reshape(array.shape)
 
 
-def _of_numbers(
+def _excess_of_numbers(
     a: np.ndarray, b: np.ndarray, both: np.ndarray, points: tuple[int, ...], units: str, tolerance: Tolerance
 ) -> np.ndarray:
     """Difference over tolerance of numbers, infinite without one."""
@@ -370,7 +344,7 @@ def _of_numbers(
     return np.where(np.isfinite(ratio), ratio, np.inf)
 
 
-def _of_texts(a: str, b: str, relative: float) -> float:
+def _excess_of_texts(a: str, b: str, relative: float) -> float:
     """Difference over tolerance of texts that differ only in numbers; infinite for others."""
     if without_numbers(a) != without_numbers(b) or not relative:
         return math.inf
