@@ -28,7 +28,7 @@ LIMIT_LOAD_TOLERANCE = 1e-3
 MOST_POINTS_BEHIND = 60
 """Most points behind a limit point in search of a stable one that carries the load."""
 
-FEW_STEPS, MANY_STEPS, MOST_STEPS = 3, 8, 12
+FEW_STEPS, MANY_STEPS, MOST_POINT_STEPS = 3, 8, 12
 """Newton steps of a point: up to which the next increment grows, beyond which it is halved, and most of them."""
 
 STRAIGHT_COLUMN_CHANGE = 0.02
@@ -77,7 +77,7 @@ def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, sca
     """Newton's method in the plane across an increment; None where it does not converge."""
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
-    for step in range(1, MOST_STEPS + 1):
+    for step in range(1, MOST_POINT_STEPS + 1):
         displacements = problem.moved(at, network.expand(u))
         load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):

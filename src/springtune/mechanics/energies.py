@@ -440,7 +440,7 @@ class StableNeoHookeEnergy(_SheetEnergy):
 LOG_LEAST_VOLUME = np.log(0.5)
 """Logarithm of the smallest volume with an equilibrium across the sheet in `NeoHookeEnergy`."""
 
-MOST_ITERATIONS = 60
+MOST_VOLUME_STEPS = 60
 """Steps of Newton's method, or halvings, for the volume of a cell: a handful are taken."""
 
 
@@ -478,7 +478,7 @@ class NeoHookeEnergy(_SheetEnergy):
 
         low, high = np.full_like(area, LOG_LEAST_VOLUME), np.full_like(area, 30.0)
         v = np.clip(3 * self.shear * area / (2 * self.shear + 1.5 * bulk), 0.9 * LOG_LEAST_VOLUME, 1.0)
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MOST_VOLUME_STEPS):
             off, slope = imbalance(v)
             low, high = np.where(off > 0, v, low), np.where(off > 0, high, v)
             step = -off / slope

@@ -26,7 +26,7 @@ from ..mesh.cells import Mesh, MeshError
 from ..mesh.sheets import connected
 from .network import Network
 
-LENGTH_TOLERANCE = 1e-6
+STRIP_TOLERANCE = 1e-6
 """Tolerance of a strip's length over its extent [1]: coordinates from files have few digits."""
 
 
@@ -78,14 +78,14 @@ def strip_fault(mesh: Mesh) -> str:
     sides = [(side, y[side]) for side in (left, right)]
     rising = all(len(side) > 1 and (np.diff(heights) > 0).all() for side, heights in sides)
     whole = rising and all(
-        abs(heights[[0, -1]] - [y.min(), y.max()]).max() <= LENGTH_TOLERANCE * size for _, heights in sides
+        abs(heights[[0, -1]] - [y.min(), y.max()]).max() <= STRIP_TOLERANCE * size for _, heights in sides
     )
     if not whole:
         return f"its ends do not run from a straight lower face to a straight upper one; {remedy}"
     heights = np.union1d(y[left], y[right])
     lengths = np.interp(heights, y[right], x[right]) - np.interp(heights, y[left], x[left])
     covered = float(lengths.mean() * np.ptp(y))
-    if np.ptp(lengths) > LENGTH_TOLERANCE * size or abs(mesh.area / covered - 1) > LENGTH_TOLERANCE:
+    if np.ptp(lengths) > STRIP_TOLERANCE * size or abs(mesh.area / covered - 1) > LENGTH_TOLERANCE:
         return f"it is not of one length at every height; {remedy}"
     return ""
 

@@ -41,7 +41,7 @@ GRADING_POWER = 3
 TOLERANCE = 1e-6
 """Last step of Newton's method over the displacements; the error that it leaves is about its square, or rounding."""
 
-LARGEST_STEP = 2.0
+FARTHEST_STEP = 2.0
 """Largest step of Newton's method over the size of the sheet."""
 
 MAX_ITERATIONS = 10
@@ -217,7 +217,7 @@ class Body:
             except SingularError:
                 return None
             step[~self.held] = factor.solve(residual)
-            if not np.abs(step).max() <= LARGEST_STEP * self.extent:
+            if not np.abs(step).max() <= FARTHEST_STEP * self.extent:
                 return None
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
