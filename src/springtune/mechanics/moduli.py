@@ -85,7 +85,7 @@ def strip_fault(mesh: Mesh) -> str:
     heights = np.union1d(y[left], y[right])
     lengths = np.interp(heights, y[right], x[right]) - np.interp(heights, y[left], x[left])
     covered = float(lengths.mean() * np.ptp(y))
-    if np.ptp(lengths) > STRIP_TOLERANCE * size or abs(mesh.area / covered - 1) > LENGTH_TOLERANCE:
+    if np.ptp(lengths) > STRIP_TOLERANCE * size or abs(mesh.area / covered - 1) > STRIP_TOLERANCE:
         return f"it is not of one length at every height; {remedy}"
     return ""
 
