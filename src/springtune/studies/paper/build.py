@@ -30,16 +30,12 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
     source, folder = Path(source), Path(folder)
     check_typst()
     _check_texts(source)
-    declared, printed = numbers.load(source / "numbers.yaml"), numbers.load(source / "printed.yaml")
-    datasets = numbers.read(paths)
+    declared, printed, drawings = (numbers.load(source / f"{name}.yaml") for name in ("numbers", "printed", "figures"))
+    datasets, tables = numbers.read(paths), declared.get("tables", {})
     content = {
         "numbers": numbers.numbers(declared.get("numbers", {}), printed, datasets),
-        "tables": {
-            name: numbers.table(entry, datasets, f"table {name}") for name, entry in declared.get("tables", {}).items()
-        },
-        "figures": draw(
-            numbers.load(source / "figures.yaml"), datasets, folder, source.resolve().parents[1] / "examples"
-        ),
+        "tables": {name: numbers.table(entry, datasets, f"table {name}") for name, entry in tables.items()},
+        "figures": draw(drawings, datasets, folder, source.resolve().parents[1] / "examples"),
         "datasets": [one.origin() for one in datasets.values()],
         "labels": _labels(datasets),
     }
@@ -85,9 +81,9 @@ def _check_texts(source: Path) -> None:
 
 def _labels(datasets: Mapping[str, Dataset]) -> list[str]:
     """Labels of beams, definitions, mesh types and materials."""
-    found = {str(label) for one in datasets.values() for name in ("beam", "definition", "mesh_type", "material")
-             if name in one.tree.coords for label in one.tree.coords[name].values}  # fmt: skip
-    return sorted(found)
+    coordinates = [one.tree.coords for one in datasets.values()]
+    names = ("beam", "definition", "mesh_type", "material")
+    return sorted({str(label) for one in coordinates for name in names if name in one for label in one[name].values})
 
 
 # -- numbers typed into the text ---------------------------------------------------------------------------------------

@@ -143,15 +143,9 @@ class Number(BaseModel):
     def text(self, value: float) -> str:
         """Format a value without its unit."""
         value = value / TEXT_UNITS[self.unit][1]
-        if self.figures is not None:
-            text = _significant(value, self.figures)
-        else:
-            text = f"{value:.{self.digits or 0}f}"
-            if float(text) == 0:
-                text = text.lstrip("-")
-        if self.sign and not text.startswith("-") and float(text.partition("×")[0]) != 0:
-            text = "+" + text
-        return text.replace("-", "−")
+        text = f"{value:z.{self.digits or 0}f}" if self.figures is None else _significant(value, self.figures)
+        plus = "+" if self.sign and not text.startswith("-") and float(text.partition("×")[0]) else ""
+        return (plus + text).replace("-", "−")
 
     def source(self) -> str:
         """Describe the source."""
@@ -350,11 +344,8 @@ def _reduce(number: Number, cells: pd.DataFrame, name: str) -> float:
 
 def _marks(number: Number, cells: pd.DataFrame) -> str:
     """Marks of a table cell that is not solved, or that has a text."""
-    solved = STATUS.index("solved")
-    marked = {
-        name: (cells[name] != solved).any() if name == "status" else any(map(str, cells[name])) for name in number.marks
-    }
-    return "".join(mark for name, mark in number.marks.items() if marked[name])
+    usual = {"status": STATUS.index("solved")}
+    return "".join(mark for name, mark in number.marks.items() if (cells[name] != usual.get(name, "")).any())
 
 
 FORMULAS = SandboxedEnvironment(undefined=StrictUndefined)
