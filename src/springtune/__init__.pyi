@@ -64,8 +64,8 @@ from .studies.kinds.benchmark.figures import plot_benchmark as plot_benchmark
 from .studies.kinds.bodies.beam_figures import plot_block as plot_block
 from .studies.kinds.bodies.beam_figures import plot_deformed as plot_deformed
 from .studies.kinds.bodies.beam_figures import plot_sensitivity as plot_sensitivity
-from .studies.kinds.bodies.errors import plot_size as plot_size
-from .studies.kinds.bodies.errors import plot_sweep as plot_sweep
+from .studies.kinds.bodies.beam_figures import plot_size as plot_size
+from .studies.kinds.bodies.beam_figures import plot_sweep as plot_sweep
 from .studies.kinds.bodies.shape_figures import plot_shape as plot_shape
 from .studies.kinds.bodies.shape_figures import plot_shape_errors as plot_shape_errors
 from .studies.kinds.bodies.shape_figures import plot_shapes as plot_shapes

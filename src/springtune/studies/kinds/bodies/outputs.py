@@ -28,7 +28,7 @@ SWEPT_SHOWN = {
 }
 """Swept parameters: label of an axis, column of a table, and factor on values of the dataset."""
 
-PLOTS, ERROR_PLOTS = "studies.kinds.bodies.beam_figures", "studies.kinds.bodies.errors"
+PLOTS = "studies.kinds.bodies.beam_figures"
 
 TABLE_LABELS = ("load", "mesh_type", "material")
 """Dimensions with one label in a table, as in the paper."""
@@ -125,7 +125,7 @@ OUTPUTS = (
         "size",
         "errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, map(study.labels, study.scenes)),
-        plot=f"{ERROR_PLOTS}:size",
+        plot=f"{PLOTS}:size",
         job="scenes",
         usual=True,
     ),
@@ -141,7 +141,7 @@ OUTPUTS = (
         "sweep",
         "errors against a swept force, thickness, modulus, Poisson's ratio or stiffness",
         figures=_sweeps,
-        plot=f"{ERROR_PLOTS}:sweep",
+        plot=f"{PLOTS}:sweep",
         job="scenes",
         usual=True,
     ),

@@ -352,18 +352,10 @@ class ShapeGridConfig(Section):
 
 SHAPES_KEY = (
     Named[ShapeConfig] | None,
-    Field(
-        None,
-        title="a section for each shape, by name",
-        description="Bodies of any outline, and their loads.",
-    ),
+    Field(None, title="a section for each shape, by name", description="Bodies of any outline, and their loads."),
 )
 SHAPE_GRIDS_KEY = (
     Annotated[dict[str, ShapeGridConfig], Field(min_length=1)] | None,
-    Field(
-        None,
-        title="a section for each grid, by name",
-        description="Grids of shapes: group `/shapes`.",
-    ),
+    Field(None, title="a section for each grid, by name", description="Grids of shapes: group `/shapes`."),
 )
 """Types and fields of the sections ``shapes`` and ``shape_grids`` of a study."""
