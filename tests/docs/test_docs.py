@@ -188,7 +188,7 @@ def repository(tmp_path_factory):
 
 
 SLOW = {"tune-an-engine.md", "take-results-elsewhere.md", "choose-a-mesh.md", "compare-studies.md", "fit-rubber.md",
-        "identify-a-sheet.md", "sweep-parameters.md"}  # fmt: skip
+        "identify-a-sheet.md", "sweep-parameters.md", "read-the-dataset.md"}  # fmt: skip
 """Of these, which take some seconds each."""
 
 

@@ -5,6 +5,8 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 from springtune.studies.runs import locks
 
 from tables import STUDIES
@@ -28,6 +30,7 @@ HOSTILE = "-a b'\"$(touch PWNED)`touch PWNED`;touch PWNED&{x}{}\n\tü*~#!%s<>|?[
 """Name of a folder: what a shell, Snakemake or a terminal may take for something else."""
 
 
+@pytest.mark.slow
 def test_no_character_of_a_path_is_the_shells(repository, tmp_path):
     """Of a config, a checkout and a folder of results; by `springtune run`, from a folder outside."""
     config, checkout, results = (tmp_path / name / HOSTILE for name in ("config", "checkout", "results"))

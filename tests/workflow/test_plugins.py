@@ -91,8 +91,10 @@ SPRINGS, METADATA = "springtune_example/springs.py", "springtune_example-1.0.dis
     [
         (SPRINGS, "# nothing", "", ""),
         (SPRINGS, "0.8 *", "0.9 *", "mesh solve collect"),
-        (SPRINGS, "(BOTTOM, BOTH),", "(BOTTOM, (1,)),", "reference mesh solve collect"),
-        (METADATA, "Version: 1.0", "Version: 1.1", "mesh solve collect"),
+        pytest.param(
+            SPRINGS, "(BOTTOM, BOTH),", "(BOTTOM, (1,)),", "reference mesh solve collect", marks=pytest.mark.slow
+        ),
+        pytest.param(METADATA, "Version: 1.0", "Version: 1.1", "mesh solve collect", marks=pytest.mark.slow),
     ],
     ids=["nothing", "a definition", "a load's supports", "the version"],
 )

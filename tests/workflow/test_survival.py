@@ -44,6 +44,7 @@ def test_who_only_looks_changes_nothing(finished):
     assert everything(finished.folder) == before
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     """Wherever it is: the kill comes when the first mesh is there."""
     run = finished

@@ -263,6 +263,7 @@ class TestRuns:
         assert [len(store.stored_keys(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
+    @pytest.mark.slow
     def test_a_sample_needs_neither_grids_nor_beams_nor_materials(self, here):
         """Its values are those beside a grid; other groups of scenes are not there."""
         beside, _ = run()
