@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ..problem.geometry import Beam
 from ..problem.parameters import PLANES
+from ..problem.quantities import nearest, positive
 from ..safe_io.tables import mesh_size_text
 
 if TYPE_CHECKING:
     from ..mesh.cells import Mesh
     from ..mesh.groups import GroupedMesh
-    from ..problem.geometry import Beam
     from ..problem.materials import Material
     from ..problem.shapes import Shape
     from ..studies.config.model import Study
@@ -93,10 +94,8 @@ def check_option_pairs() -> None:
 # -- beams and shapes --------------------------------------------------------------------------------------------------
 
 
-def read_beam(text: str, thickness: str) -> "Beam":
+def read_beam(text: str, thickness: str) -> Beam:
     """Beam of a text such as ``200x40``."""
-    from ..problem.geometry import Beam
-
     try:
         length, height = (1e-3 * float(side) for side in text.lower().split("x"))
     except ValueError:
@@ -124,7 +123,6 @@ def read_material(given: Mapping[str, Any]) -> "Material":
 
 def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
     """Study, its shapes, and the shape of an option such as ``config/shapes.yaml:cook``."""
-    from ..problem.quantities import nearest
     from ..studies.kinds import load_study
 
     path, _, name = (text, "", "") if Path(text).is_file() else text.rpartition(":")
@@ -157,8 +155,6 @@ class BodyOptions:
     @property
     def is_beam(self) -> bool:
         """Whether the body is a beam."""
-        from ..problem.geometry import Beam
-
         return isinstance(self.body, Beam)
 
     @property
@@ -179,8 +175,6 @@ def read_body(given: Mapping[str, Any], load: str | None, sized: bool = True) ->
 
 def _size(given: Mapping[str, Any], needed: bool) -> float | None:
     """Mesh size of the options [m]."""
-    from ..problem.quantities import positive
-
     if given["size"] is None and needed:
         raise ValueError("size: missing; give the length of an edge such as '2 mm'")
     return None if given["size"] is None else positive(given["size"], "length", "size")
@@ -189,7 +183,6 @@ def _size(given: Mapping[str, Any], needed: bool) -> float | None:
 def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     from ..mesh.formats import read_beam_mesh
     from ..mesh.types import MESH_TYPES
-    from ..problem.quantities import positive
     from ..scene.meshes import make_mesh
 
     material, mesh_type, size = read_material(given), given["mesh"] or "structured", None
@@ -213,8 +206,6 @@ def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) 
 
 def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     """Shape of a study; load and material may be None if the study has only one for it."""
-    from ..problem.quantities import nearest
-
     study, shapes, shape = shape_of_study(given["study"])
     if load is None and len(shape.loads) > 1:
         raise ValueError(f"load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")

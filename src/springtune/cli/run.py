@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..problem.geometry import AssumptionWarning
 from ..registry import how_to_install
 from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 from . import examples
@@ -40,7 +41,6 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     Snakemake's. Exit codes: 0 all is made, also if scenes could not be solved; 1 the study is wrong or a job failed; 2
     wrong options.
     """
-    from ..problem.geometry import AssumptionWarning
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study  # here, so that --help does not wait for it
     from ..studies.runs.rerun import PAPER_STUDIES

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from springtune.mesh.types import MESH_TYPES
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.registry import Declaration, plugin_packages
 from springtune.springs.base import DEFINITIONS
 
@@ -24,9 +26,6 @@ from .source import PACKAGE, hash_of
 
 if TYPE_CHECKING:
     from grimp import ImportGraph
-
-    from springtune.problem.geometry import Beam
-    from springtune.problem.materials import Material
 
 CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
 """Packages whose versions do not influence results: they carry numbers as they are."""
@@ -282,13 +281,13 @@ def code_key(code: Closure) -> str:
 
 
 @cache
-def beam_key(beam: "Beam") -> dict[str, Any]:
+def beam_key(beam: Beam) -> dict[str, Any]:
     """Properties of a beam that results depend on; its label is not one."""
     return asdict(beam) | {"name": ""}
 
 
 @cache
-def material_key(material: "Material", density: bool = False) -> dict[str, Any]:
+def material_key(material: Material, density: bool = False) -> dict[str, Any]:
     """Properties of a material that results depend on; statics ignore density."""
     known = asdict(material) | {"name": ""}
     known.pop("test_errors", None)

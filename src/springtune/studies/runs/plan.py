@@ -9,17 +9,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import log2
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from springtune.safe_io import atomic
 
 from ..config.kind import Stage, kinds
+from ..config.model import Study
 from . import attempts, store
 from .keys import stage_key
 from .source import RECORDS, TASKS, hash_of, read_note
-
-if TYPE_CHECKING:
-    from ..config.model import Study
 
 MOST_JOBS = 64
 """Most jobs of a stage."""
@@ -103,7 +101,7 @@ def stages() -> tuple[Stage, ...]:
     return tuple(stage for kind in kinds() for stage in kind.stages)
 
 
-def plan(study: "Study", folder: Path) -> dict[str, Job]:
+def plan(study: Study, folder: Path) -> dict[str, Job]:
     """Plan the jobs of a study's stages by name; nothing is written."""
     jobs: dict[str, Job] = {}
     bundles: dict[str, dict[str, list[str]]] = {}
@@ -143,7 +141,7 @@ def _job(stage: Stage, folder: Path, label: str, tasks: Iterable[Task]) -> Job:
     return Job(folder, f"{stage.name}_{label}", digest, products, stage=stage, label=label, content=content)
 
 
-def results(stage: Stage, study: "Study", folder: Path) -> Iterator[tuple[Task, dict[str, Any]]]:
+def results(stage: Stage, study: Study, folder: Path) -> Iterator[tuple[Task, dict[str, Any]]]:
     """Tasks of a stage and the scalars of their stored results, in the order of the tasks."""
     tasks, files = list(stage.tasks(study)), defaultdict(list)
     keys = [task.key_of(stage) for task in tasks]
@@ -154,7 +152,7 @@ def results(stage: Stage, study: "Study", folder: Path) -> Iterator[tuple[Task, 
         yield task, dict(found[task.file or key][key])
 
 
-def rows(stage: Stage, study: "Study", folder: Path) -> Iterator[dict[str, Any]]:
+def rows(stage: Stage, study: Study, folder: Path) -> Iterator[dict[str, Any]]:
     """Rows of the stored results of a stage, each with the labels of its task."""
     for task, result in results(stage, study, folder):
         for row in result.get("rows", [result]):

@@ -2,17 +2,13 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from ..config.kind import FORMATS, kinds, modules, outputs
+from ..config.kind import FORMATS, Output, kinds, modules, outputs
+from ..config.model import Study
 from .keys import stage_key
 from .plan import Job, plan
 from .provenance import inputs
 from .source import PACKAGE, TASKS, checksum, hash_of, read_note
-
-if TYPE_CHECKING:
-    from ..config.kind import Output
-    from ..config.model import Study
 
 DATASET, SUMMARY, PAGE = "dataset.nc", "summary.txt", "index.html"
 """Files that every study has."""
@@ -26,11 +22,11 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 
 
-STUDIES_READ: "list[tuple[Study, dict[str, Job]]]" = []
+STUDIES_READ: list[tuple[Study, dict[str, Job]]] = []
 """Studies that this process runs, with all their jobs: the requested one, and those that the paper reads."""
 
 
-def output_jobs(study: "Study") -> "dict[str, list[Output]]":
+def output_jobs(study: Study) -> dict[str, list[Output]]:
     """Requested outputs of a study that have files, by the job that makes them."""
     found: dict[str, list[Output]] = {}
     for one in outputs().values():
@@ -39,7 +35,7 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
     return found
 
 
-def output_files(output: "Output", study: "Study") -> list[str]:
+def output_files(output: Output, study: Study) -> list[str]:
     """Files of an output; for the page, all tables as CSV and the page itself."""
     figures = [f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS]
     names = [*output.tables(study)]
@@ -48,13 +44,13 @@ def output_files(output: "Output", study: "Study") -> list[str]:
     return figures + [f"{output.into}/{name}" for name in names]
 
 
-def linked_files(study: "Study") -> list[str]:
+def linked_files(study: Study) -> list[str]:
     """Files that the page to browse links to, relative to the study's folder."""
     made = (path for members in output_jobs(study).values() for one in members for path in output_files(one, study))
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
 
-def jobs(study: "Study", folder: Path) -> dict[str, Job]:
+def jobs(study: Study, folder: Path) -> dict[str, Job]:
     """All jobs of a study by name."""
     found, read = plan(study, folder), (str(folder / DATASET),)
     made = [(COLLECT, _collect_digest(study, found), [DATASET, SUMMARY])]
@@ -68,7 +64,7 @@ def jobs(study: "Study", folder: Path) -> dict[str, Job]:
     return found
 
 
-def _collect_digest(study: "Study", jobs: dict[str, Job]) -> str:
+def _collect_digest(study: Study, jobs: dict[str, Job]) -> str:
     """Digest of a study's dataset: of the study's files, the results of its stages and the code."""
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
@@ -76,7 +72,7 @@ def _collect_digest(study: "Study", jobs: dict[str, Job]) -> str:
     return hash_of(study.name, inputs(study), results, code)
 
 
-def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
+def _present_digest(members: Iterable[Output], files: list[str]) -> str:
     used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
@@ -87,14 +83,14 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 
 
-def _browse_digest(study: "Study") -> str:
+def _browse_digest(study: Study) -> str:
     assets = {path.name: checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())}
     return hash_of(
         linked_files(study), [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))], assets
     )
 
 
-def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
+def paper_job(source: Path, datasets: Iterable[Path], folder: Path) -> Job:
     """The job that typesets the paper."""
     texts = {path.name: checksum(path) for path in sorted(source.iterdir()) if path.is_file()}
     examples = sorted((source.resolve().parents[1] / "examples").glob("*.py"))
@@ -126,7 +122,7 @@ def is_missing(why: str) -> bool:
     return why.endswith(MISSING)
 
 
-def outdated(study: "Study", folder: Path) -> dict[Path, str] | None:
+def outdated(study: Study, folder: Path) -> dict[Path, str] | None:
     """Return the records of done jobs that must run again, with the reasons; None if a job was never done."""
     if not (folder / TASKS).exists():  # never run: planning 10,000 scenes takes a second
         return None
