@@ -46,7 +46,7 @@ def count(value: Any, name: str, most: int = MOST_STEPS) -> int:
 
 
 class EngineError(ValueError):
-    """An engine that cannot run a scene; the message says why and what to do.
+    """Engine that cannot run a scene; the message says why and what to do.
 
     Examples
     --------
@@ -65,12 +65,12 @@ class EngineAbsentError(EngineError):
 
 @dataclass(frozen=True)
 class Setting:
-    """How an engine takes its time.
+    """Time step of an engine: frame, substeps, iterations, precision.
 
     Attributes
     ----------
     dt : float or str
-        Time of a frame [s], at most 1; a text such as ``"1/60"`` or ``"5 ms"`` becomes a number.
+        Time of a frame [s], at most 1, or a text such as ``"1/60"`` or ``"5 ms"``.
     substeps : int
         Steps of a frame, at most 100,000.
     iterations : int
@@ -81,7 +81,7 @@ class Setting:
     Raises
     ------
     ValueError
-        If a number is out of its range; the message names it.
+        If a number is out of its range.
 
     Examples
     --------
@@ -136,14 +136,7 @@ class Session(Protocol):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that is typed into an engine: the unit that it really has, and its formula.
-
-    Attributes
-    ----------
-    unit : str
-    formula : str
-        From Young's modulus E, Poisson's ratio nu, the thickness h of the sheet, and the mesh.
-    """
+    """Number that is typed into an engine: its unit, and its formula from E, nu, the thickness h and the mesh."""
 
     unit: str
     formula: str
@@ -174,7 +167,7 @@ class Engine(Declaration):
     program : str
         ``springtune`` for the textbook solvers.
     needs : tuple of str
-        Modules that it imports; with the first version that will do, ``"mujoco>=3.13"``.
+        Modules that it imports, also with their first version: ``"mujoco>=3.13"``.
     extra : str
         Optional dependencies of springtune that have them.
     laws : tuple of str
@@ -186,12 +179,11 @@ class Engine(Declaration):
     iterates : bool
         Whether iterations mean something to it.
     typed : callable
-        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all. `numbers`
-        calls it.
+        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
     of_setting : bool
-        Whether these numbers follow the setting: `typed` takes (net, setting).
+        Whether these numbers depend on the setting: `typed` takes (net, setting).
     law : callable, optional
-        (net, reference stiffness) -> energies that its triangles have in the place of the net's.
+        (net, reference stiffness) -> energies of its triangles in place of the net's.
     besides : str
         What else a script sets, as runs here do.
     measured : str
@@ -201,21 +193,19 @@ class Engine(Declaration):
 
     Examples
     --------
+    A net in an engine, by hand:
+
     >>> import springtune as st
-    >>> st.ENGINES["xpbd"].summary
-    'Extended position-based dynamics: springs as constraints with compliance, multipliers reset in each step'
-    >>> st.ENGINES["xpbd"].parameters["compliance"].unit, st.ENGINES["xpbd"].absent
+    >>> xpbd = st.ENGINES["xpbd"]
+    >>> xpbd.parameters["compliance"].unit, xpbd.absent
     ('m/N', '')
-
-    A net in it, by hand:
-
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "0.2 N", definition="lattice")
     >>> net, setting = st.SpringNet.from_scene(scene), st.Setting("1 ms", iterations=100)
-    >>> st.ENGINES["xpbd"].check(setting, net)
-    >>> list(st.ENGINES["xpbd"].numbers(net, setting))
+    >>> xpbd.check(setting, net)
+    >>> list(xpbd.numbers(net, setting))
     ['compliance']
-    >>> session = st.ENGINES["xpbd"].start(net, setting, damping=100.0)
+    >>> session = xpbd.start(net, setting, damping=100.0)
     >>> session.advance(200)
     >>> session.displacements().shape == net.points.shape
     True
@@ -284,30 +274,15 @@ class Engine(Declaration):
         Returns
         -------
         dict of str to float or ndarray
-
-        Examples
-        --------
-        The stiffness of position-based dynamics is another one for each setting:
-
-        >>> import springtune as st
-        >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-        >>> mesh = st.make_mesh(beam, "structured", "10 mm")
-        >>> net = st.SpringNet.from_scene(st.Scene(beam, mesh, rubber, "traction", "0.2 N", definition="lattice"))
-        >>> for iterations in (1, 10):
-        ...     setting = st.Setting("1 ms", iterations=iterations)
-        ...     print(f"{st.ENGINES['pbd'].numbers(net, setting)['stiffness'].max():.3f}")
-        0.987
-        0.354
         """
         return self.typed(net, setting) if self.of_setting else self.typed(net)
 
     def start(self, net: SpringNet, setting: Setting, damping: float) -> Session:
-        """Start a session.
+        """Start a session of a net with masses, supports and forces.
 
         Parameters
         ----------
         net : SpringNet
-            With masses, supports and forces.
         setting : Setting
         damping : float
             Over mass [1/s].
@@ -354,7 +329,7 @@ def engine(name: str, *, order: float = 1000, **declared: Any) -> Callable[[Func
     Parameters
     ----------
     name : str
-        Program and solver; a label of datasets.
+        Program and solver; a label of datasets. A second declaration of the same function replaces the first.
     order : float, optional
         Place in the order of labels.
     **declared
@@ -365,16 +340,10 @@ def engine(name: str, *, order: float = 1000, **declared: Any) -> Callable[[Func
     callable
         Decorator of a function (net, setting, damping) -> `Session`.
 
-    Raises
-    ------
-    ValueError
-        If another function has that name; the same function, declared again, replaces the former.
-
     Examples
     --------
     An engine in which nothing moves:
 
-    >>> import numpy as np
     >>> import springtune as st
     >>> @st.engine("still", precisions=("float64",))
     ... class Still:

@@ -42,7 +42,7 @@ TRIED_ORDERS = 4
 """Orders of particles, springs and cells that a calibration is tried in."""
 
 DAMPING_NOTE = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
-"""What is said of a run's damping."""
+"""Note on the damping of a run."""
 
 RUN_TOLERANCES = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
@@ -57,7 +57,7 @@ are hopeless, and how many are tried."""
 
 @dataclass(frozen=True, repr=False)
 class LoadBand(Tabled):
-    """How a calibrated factor fares under a load of several sizes.
+    """Errors of a calibrated factor under a load of several sizes.
 
     Attributes
     ----------
@@ -76,12 +76,11 @@ class LoadBand(Tabled):
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["bending", "shear"], needed=False)
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["bending"], needed=False)
     >>> for band in fit.bands:
     ...     print(f"{band.load} {100 * band.error:+.0f} %, converged {100 * band.definition_error:+.0f} %")
     traction -0 %, converged +0 %
     bending -35 %, converged -35 %
-    shear -17 %, converged -14 %
     """
 
     load: str
@@ -92,7 +91,7 @@ class LoadBand(Tabled):
 
     @property
     def error(self) -> float:
-        """Error at the third size [1]: that of the scene, or one that moves the reference as far."""
+        """Error at the third size [1], the scene's or one that moves the reference as far."""
         return self.errors[LOAD_SHARES.index(1.0)]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
@@ -105,7 +104,7 @@ class LoadBand(Tabled):
 
 @dataclass(frozen=True, repr=False)
 class NeededSetting(Tabled):
-    """Setting whose solver error is small without a factor, found by doubling its substeps or its iterations.
+    """Setting whose solver error is below 1 % without a factor, found by doubling its substeps or its iterations.
 
     Attributes
     ----------
@@ -149,7 +148,7 @@ class NeededSetting(Tabled):
 
 @dataclass(frozen=True, repr=False)
 class EngineFit(Tabled):
-    """What to type into an engine so that a scene is right at a setting, and how far that goes.
+    """Numbers to type into an engine so that a scene is right at a setting, and their errors.
 
     Attributes
     ----------
@@ -312,6 +311,8 @@ def fit_engine(
 ) -> EngineFit:
     """Find what to type into an engine so that a scene's displacement is that of finite elements.
 
+    One factor on all stiffnesses and moduli is found by Brent's method in its inverse.
+
     Parameters
     ----------
     scene : Scene
@@ -320,11 +321,11 @@ def fit_engine(
         Key of `springtune.ENGINES`.
     setting : Setting, optional
     loads : iterable of str, optional
-        Loads besides the scene's that get a band; by default all of a beam but those that turn, or all of a shape.
+        Further loads that get a band, with the force that moves the reference as far; by default all that do not turn.
     needed : bool, optional
-        Whether settings that converge are looked for, which takes the longest.
+        Whether to look for settings that converge, which takes the longest.
     frames : int, optional
-        At most, of each run, as of `in_engine`.
+        Most frames of each run, as of `in_engine`.
     **parts
         In the place of a setting its parts: ``dt``, ``substeps``, ``iterations``, ``precision``.
 
@@ -338,14 +339,6 @@ def fit_engine(
         If no engine has the name.
     EngineError
         If the engine is not installed or lacks what the scene has, or the load has no displacement.
-    ValueError
-        If a load is unknown.
-
-    Notes
-    -----
-    One factor is on all stiffnesses and moduli. It is found by Brent's method in the softness, 1 over the factor, in
-    which displacements are nearly straight, between factors that are 8 times apart. Other loads of a beam have the
-    force that moves the reference as far as the scene's does.
 
     Examples
     --------
@@ -456,8 +449,7 @@ def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
 def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
     """Two factors with the right one between them; NaN for the second where there is none, and one that diverged.
 
-    What diverges in search of a softer one is too soft. What diverges in search of a stiffer one, as explicit steps do,
-    is retried nearer.
+    A factor that diverges in search of a stiffer one, as in explicit steps, is retried nearer.
     """
     stiffen = runs.ratio(1.0, setting) > 1
     first, diverged, step = 1.0, np.nan, BRACKET_RATIO if stiffen else 1 / BRACKET_RATIO

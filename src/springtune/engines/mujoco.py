@@ -3,7 +3,7 @@
 The model is that of `springtune.handover.mujoco`, with the step and the integrator of a setting. `Euler` and
 `implicitfast` are implicit in dampers alone: as with `RK4`, springs need steps below the stable one. `discrete`,
 since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `iterations` are those of its conjugate
-gradients, of which MuJoCo allows 100 where nothing is said; they stop at a ten-thousandth of the load. The others do
+gradients, of which MuJoCo allows 100 by default; they stop at a ten-thousandth of the load. The others do
 not iterate without contacts. MuJoCo computes in double precision.
 
 Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` in joints and tendons,
@@ -48,7 +48,7 @@ def _no_log() -> Iterator[None]:
     import mujoco
 
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda said: None)
+    mujoco.set_mju_user_warning(lambda message: None)
     try:
         yield
     finally:

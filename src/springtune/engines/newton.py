@@ -138,7 +138,7 @@ SCRIPT_SETTINGS = (
     "default) and model.particle_grid=None; gravity 0; masses density times thickness times a third of the triangles' "
     "areas; points about the origin"
 )
-"""What a script sets besides, as runs here do."""
+"""Further settings of a script, as runs here have them."""
 
 
 NEWTON_COMMON: dict[str, Any] = {

@@ -19,7 +19,7 @@ from ..scene.single import Result, Scene
 from .base import ENGINES, Engine, EngineError, Session, Setting, count, number
 
 MOST_DRIFT = 0.05
-"""Error across what is measured, over it, above which it is said, and springs are not recommended."""
+"""Error across what is measured, over it, above which a note warns of it, and springs are not recommended."""
 
 MOST_ITERATIONS = 1_000_000_000
 """Most frames times substeps times iterations of a run."""
@@ -57,7 +57,7 @@ MOST_CHANGE_RATIO = 0.99
 
 @dataclass(frozen=True)
 class Ended:
-    """How a session ended; see `EngineResult`."""
+    """End of a session; see `EngineResult`."""
 
     displacements: np.ndarray
     status: str
@@ -69,7 +69,7 @@ class Ended:
 
 @dataclass(frozen=True, repr=False)
 class EngineResult(Tabled, Ended):
-    """What a scene comes to in an engine.
+    """Result of a scene in an engine.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class EngineResult(Tabled, Ended):
 
     @property
     def definition_error(self) -> float:
-        """Error of the definition: that of the network's equilibrium, with a factor of 1 [1]."""
+        """Error of the network's equilibrium, with a factor of 1 [1]."""
         return (self.exact - self.reference) / abs(self.reference)
 
     @cached_property
@@ -160,12 +160,12 @@ class EngineResult(Tabled, Ended):
 
     @property
     def law_error(self) -> float:
-        """What the engine's own law of triangles adds to it [1]: 0 where it has the definition's."""
+        """Error that the engine's own law of triangles adds [1]; 0 where it has the definition's law."""
         return (self.by_law - self.exact) / abs(self.reference)
 
     @property
     def solver_error(self) -> float:
-        """What the engine's solver adds to both: (engine - equilibrium of its law) / abs(reference) [1]."""
+        """Error that the engine's solver adds: (engine - equilibrium of its law) / abs(reference) [1]."""
         return (self.displacement - self.by_law) / abs(self.reference)
 
     @cached_property
@@ -248,9 +248,7 @@ def in_engine(
     KeyError
         If no engine has the name.
     EngineError
-        If the engine is not installed, or lacks what the scene has; the message says what to do.
-    ValueError
-        If a number is out of its range.
+        If the engine is not installed, or lacks what the scene has.
 
     Examples
     --------
@@ -291,8 +289,8 @@ def in_engine(
     ended = follow(session, window, asked, rest, extent)
     ended = replace(ended, displacements=ended.displacements[places])
     if ended.status == "rest" and scene.network.inverted(ended.displacements):
-        said = "at rest with cells turned inside out; take shorter steps, or less load"
-        ended = replace(ended, status="inverted", message=said)
+        message = "at rest with cells turned inside out; take shorter steps, or less load"
+        ended = replace(ended, status="inverted", message=message)
     return EngineResult(**vars(ended), scene=scene, engine=engine, setting=setting, factor=factor, damping=damping)
 
 
@@ -352,8 +350,7 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
     """Advance a session until it rests.
 
     Where the changes in windows of frames shrink by a ratio r, the rest of the way is the last change times r / (1 -
-    r). A rising r tells of a slower motion below, so r is taken as if it rose on. A run rests where the rest of the way
-    stays below `tolerance` of the displacement in `REST_WINDOWS` windows, or oscillates by less.
+    r). A run rests where this stays below `tolerance` of the displacement, or where it oscillates by less.
     """
     seen: list[np.ndarray] = []
     seconds: list[float] = []
@@ -370,8 +367,8 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
             now = session.displacements()
             size = float(np.abs(now).max())
             if not size <= DIVERGED_EXTENTS * extent:
-                said = f"diverged within {done} frames; take more substeps, or a smaller stiffness"
-                return Ended(np.full(now.shape, np.nan), "diverged", said, done, _frame_seconds(seconds), np.nan)
+                message = f"diverged within {done} frames; take more substeps, or a smaller stiffness"
+                return Ended(np.full(now.shape, np.nan), "diverged", message, done, _frame_seconds(seconds), np.nan)
             looks.append(now)
         seen = [
             *seen[1 - SWING_WINDOWS :],
@@ -390,10 +387,10 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
             return Ended(now, "rest", "", done, _frame_seconds(seconds), 0.0)
     swing = _swing(seen[len(seen) // 2 :])
     if len(seen) > 1 and _oscillates(seen) and swing > STEADY_SWING_RATIO * _swing(seen[: len(seen) // 2]):
-        said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
-        return Ended(_mean(seen), "swings", said, done, _frame_seconds(seconds), swing)
-    said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
-    return Ended(now, "moving", said, done, _frame_seconds(seconds), swing)
+        message = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
+        return Ended(_mean(seen), "swings", message, done, _frame_seconds(seconds), swing)
+    message = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
+    return Ended(now, "moving", message, done, _frame_seconds(seconds), swing)
 
 
 def _mean(seen: list[np.ndarray]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What the textbook solvers share: a step from the inertial position, and the velocity that it leaves.
+"""Base of the textbook solvers: a step from the inertial position, and the velocity after it.
 
 A step minimises ``|x - y|^2 / (2 h^2) + W(x)``, the first term weighted by masses, about ``y = x + h v + h^2 f / m``. A
 solver that begins at y and stops early ends between y and the minimum. So it rests where each step falls back by

@@ -41,7 +41,7 @@ def _spring(x, here, there, length, stiffness, block):  # type: ignore[no-untype
 
 @compiled
 def _squares(x, cell, corner, squares, tensile, coupling, block):  # type: ignore[no-untyped-def]
-    """As `_spring`, of a corner of a triangle of squared lengths."""
+    """Add force and second derivatives of a corner of a triangle of squared lengths, see `_spring`."""
     i, j, k = cell[corner], cell[(corner + 1) % 3], cell[corner - 1]
     # Sides opposite j and k meet in i; that opposite i does not move with it.
     jx, jy, kx, ky = x[i, 0] - x[k, 0], x[i, 1] - x[k, 1], x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
@@ -63,7 +63,7 @@ def _squares(x, cell, corner, squares, tensile, coupling, block):  # type: ignor
 
 @compiled
 def _area(x, cell, corner, double, modulus, block):  # type: ignore[no-untyped-def]
-    """As `_spring`, of a corner of a cell of area; `double` is twice its area at rest, `modulus` is over twice that."""
+    """Add force and second derivatives of a cell's area; `double` is twice it at rest, `modulus` over twice that."""
     corners, twice = len(cell), -double
     for c in range(corners):
         i, j = cell[c], cell[(c + 1) % corners]

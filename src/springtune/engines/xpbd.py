@@ -40,7 +40,7 @@ def _volume(trace, area, shear, bulk):  # type: ignore[no-untyped-def]
 
 @compiled
 def _rubber(here, slopes, area, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
-    """Constraints of a triangle of rubber, and their derivatives; `growth` is that of its area by its corners."""
+    """Constraints of a triangle of rubber and their derivatives; `growth` is its area's derivative by its corners."""
     across, turned, share = 0.0, 0.0, 1.0
     for c in range(3):
         across += here[c, 0] * slopes[c, 0] - here[c, 1] * slopes[c, 1]

@@ -82,8 +82,8 @@ def read(path: str | Path) -> Net:
     try:
         return _checked(json.loads(path.read_text(encoding="utf-8")))
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        said = " ".join(str(error).split())[:MOST_MESSAGE_CHARACTERS] or type(error).__name__
-        raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
+        reason = " ".join(str(error).split())[:MOST_MESSAGE_CHARACTERS] or type(error).__name__
+        raise ValueError(f"{path}: is damaged, or no net of springtune ({reason}); write it again") from None
 
 
 def _checked(found: dict[str, Any]) -> Net:
@@ -167,14 +167,14 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):
             texts[others[name]] = _csv_text(arrays | terms.get(count, {}), TABLES[name])
-    said = [f"# springs of a network; particles are counted from 0, and stand in {shown(others['particles'].name)}"]
-    said += [
+    comments = [f"# springs of a network; particles are counted from 0, and stand in {shown(others['particles'].name)}"]
+    comments += [
         f"# cells of {count} corners, and what energies they have, stand in {shown(others[name].name)}"
         for count, name in CELL_ARRAYS.items()
         if others[name] in texts
     ]
-    said += [f"# {json_line(line)}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).split("\n")]
-    texts[path] = "\n".join([*said, ""]) + _csv_text(arrays, TABLES[""])
+    comments += [f"# {json_line(line)}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).split("\n")]
+    texts[path] = "\n".join([*comments, ""]) + _csv_text(arrays, TABLES[""])
     with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
         for one, text in texts.items():
             unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")

@@ -51,7 +51,7 @@ def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
     accelerations = np.abs(np.where(net.held, 0, net.forces)).max(axis=1) / simulation.masses
     load = net.header.get("load")
     title = net.header["definition"] + (f", {load_in_words(load)}" if load else "")
-    said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
+    step_note = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
     free = ["".join(axis for axis, fixed in zip("xy", held) if not fixed) for held in net.held.tolist()]
     joints = [f"{axis}{number}" for number, axes in enumerate(free) for axis in axes]
     shares = net.forces[~net.held] / (simulation.force or 1.0)
@@ -59,7 +59,7 @@ def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
     return fill_template(
         "mujoco.xml",
         title=printable(title),
-        about=[*comment_lines(net, simulation, said), f"Written {for_versions(net.energies)}."],
+        about=[*comment_lines(net, simulation, step_note), f"Written {for_versions(net.energies)}."],
         simulation=simulation,
         integrator=integrator,
         fast=accelerations.max() > LARGEST_ACCELERATION,
@@ -76,7 +76,7 @@ def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
 
 
 def for_versions(energies: Sequence[Terms]) -> str:
-    """Which versions of MuJoCo a file is for."""
+    """Versions of MuJoCo that a file is for."""
     if not energies:
         return "for MuJoCo 3 and 4"
     return "for MuJoCo 4; MuJoCo 3, whose flex has other constants, refuses it"

@@ -117,8 +117,6 @@ class SpringNet(Tabled, Net):
     1.865e+08 N/m, 0.0628 kg, W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area
     >>> print({load: f"{100 * error:+.1f} %" for load, error in net.header["expected_error"].items()})
     {'traction': '+4.0 %', 'bending': '+1.7 %', 'shear': '-0.2 %'}
-    >>> print(f"{1e9 * net.header['largest_stable_step']['central-difference']:.0f} ns")
-    634 ns
     >>> [path.name for path in net.write("net.json")]
     ['net.json']
     >>> (st.SpringNet.read("net.json").stiffness == net.stiffness).all().item()
@@ -157,11 +155,6 @@ class SpringNet(Tabled, Net):
         Returns
         -------
         SpringNet
-
-        Raises
-        ------
-        DefinitionError
-            If the definition does not support the mesh or the material.
         """
         springs = scene.springs if springs is None else springs
         about, forces = scene.boundary_problem, scene.boundary_problem.forces(springs)
@@ -221,8 +214,7 @@ class SpringNet(Tabled, Net):
         mesh_name, errors : optional
             As of `from_scene`.
         loads : iterable of str, optional
-            Loads whose expected errors the header says: of traction, compression, bending, shear and pressure;
-            traction, bending and shear without.
+            Loads whose expected errors the header says; traction, bending and shear without.
 
         Returns
         -------
@@ -231,10 +223,7 @@ class SpringNet(Tabled, Net):
         Raises
         ------
         ValueError
-            If an argument is unknown or out of its range, the mesh does not fill the beam, or loads are given without
-            a beam.
-        DefinitionError
-            If the definition does not support the mesh or the material, or lacks what it needs.
+            If the mesh does not fill the beam, or loads are given without a beam.
         """
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
@@ -260,8 +249,8 @@ class SpringNet(Tabled, Net):
             if errors:
                 from ..prediction.choices import USUAL_LOADS, check_loads
 
-                said = check_loads(USUAL_LOADS if loads is None else loads)
-                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
+                names = check_loads(USUAL_LOADS if loads is None else loads)
+                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, names)
         return cls(**parts)
 
     def write(self, path: str | Path) -> list[Path]:
@@ -306,11 +295,6 @@ class SpringNet(Tabled, Net):
         Returns
         -------
         SpringNet
-
-        Raises
-        ------
-        ValueError
-            If there is no such file, or it is not as `write` writes it.
         """
         return cls(**vars(hook("files").read(path)))
 

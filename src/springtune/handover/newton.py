@@ -22,7 +22,7 @@ LAW_COMMENTS = (
     "Triangles have Newton's law: mu/2 (tr C - 2 J) + (lambda + mu)/2 (J - 1)^2, mu = tri_ke, lambda = tri_ka.",
     "At small strain it is that of the definition; the displacement expected here is by Newton's law.",
 )
-"""What comments say of that law."""
+"""Comments on that law."""
 
 EXPLICIT_STEP_ITERATIONS = 10
 """Iterations in which VBD converges in a step that is stable in explicit schemes."""
@@ -75,19 +75,19 @@ def newton_script(net: Net) -> str:
         step, iterations = LONG_STEP_AND_ITERATIONS[0] * largest, LONG_STEP_AND_ITERATIONS[1]
     # Of the slowest mode that the load excites.
     rate = damping / 2 - max(damping**2 / 4 - simulation.frequency**2, 0.0) ** 0.5
-    said = f"the one here is {step / largest:.2g} times that, in which {iterations} iterations converge"
+    step_note = f"the one here is {step / largest:.2g} times that, in which {iterations} iterations converge"
     seconds = DECAY_TIMES / rate if rate else 100 * simulation.step
     if calibrated := net.header.get("calibrated"):
         step, damping, seconds = (float(calibrated[one]) for one in ("step", "damping", "seconds"))
         iterations = int(calibrated["iterations"])
-        said = f"the one here is that of {calibrated['setting']}, for which the stiffness is made"
+        step_note = f"the one here is that of {calibrated['setting']}, for which the stiffness is made"
     return fill_template(
         "newton.py",
         net=net,
         simulation=simulation,
         promised=float(calibrated["displacement"]) if calibrated else None,
         damping=damping,
-        about=[*comment_lines(net, simulation, said), *(LAW_COMMENTS if net.energies else ())],
+        about=[*comment_lines(net, simulation, step_note), *(LAW_COMMENTS if net.energies else ())],
         tri_ke=shear,
         tri_ka=first,
         step=step,

@@ -55,8 +55,8 @@ def write_vtu(
             for name, value in ((quoteattr(shown(key)), number) for key, number in numbers.items())
         )
         # A comment must not have two hyphens in a row; as JSON has them they are the same.
-        said = comment.replace("--", "-\\u002d")
+        header = comment.replace("--", "-\\u002d")
         fields = f"<FieldData>{added}</FieldData>" if added else ""
         grid_tag = "<UnstructuredGrid>"
-        begin = f"<!--\n{said}\n-->{grid_tag}{fields}"
+        begin = f"<!--\n{header}\n-->{grid_tag}{fields}"
         unfinished.write_bytes(unfinished.read_bytes().replace(grid_tag.encode(), begin.encode(), 1))

@@ -1,4 +1,4 @@
-"""What simulators need besides springs: masses, damping, a stable step, and the equilibrium to expect."""
+"""Masses, damping, a stable step and the expected equilibrium of a net, for simulators."""
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -44,7 +44,7 @@ class EquilibriumWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Simulation:
-    """How a net moves in a simulator, and its equilibrium.
+    """Step, damping, frequencies and equilibrium of a net in a simulator.
 
     `masses` (n_points,) are in kg. `force` is signed [N]; 1 for a load case of a shape, 0 without a load.
     `largest_step` is stable about rest without damping, `step` also in motion [s]. `frequency` and `loaded_frequency`,
@@ -120,14 +120,14 @@ def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
     """Warn of a missing equilibrium, or of one that is far away."""
     if displacements is None:
         smaller = "force" if net.header.get("beam") else "scale"
-        said = f"no equilibrium was found, so the file has none: {why}; give a smaller {smaller}"
+        message = f"no equilibrium was found, so the file has none: {why}; give a smaller {smaller}"
     else:
         moved, extent = float(np.abs(displacements).max()), float(np.ptp(net.points, axis=0).max())
         if moved <= extent:
             return
         body = "the beam is long" if net.header.get("beam") else "the shape is wide or high"
-        said = f"the equilibrium is {moved:.3g} m away from rest, further than {body} ({extent:.3g} m)"
-    warnings.warn(said, EquilibriumWarning, stacklevel=2)
+        message = f"the equilibrium is {moved:.3g} m away from rest, further than {body} ({extent:.3g} m)"
+    warnings.warn(message, EquilibriumWarning, stacklevel=2)
 
 
 def load_in_words(load: Mapping[str, Any]) -> str:
@@ -230,10 +230,10 @@ def comment_lines(net: Net, simulation: Simulation, integrator: str) -> list[str
     if load:
         lines.append(f"Load: {load_in_words(load)}.")
     if isinstance(errors, dict):
-        said = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
-        if said:
+        expected = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
+        if expected:
             what = "Expected error of the displacement" if header.get("beam") else "Expected errors"
-            lines.append(f"{what}, small strain: {', '.join(said)}.")
+            lines.append(f"{what}, small strain: {', '.join(expected)}.")
     lines.append(
         f"The largest stable step of explicit schemes is {simulation.largest_step:.4g} s at rest; {integrator}."
     )

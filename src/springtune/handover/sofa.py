@@ -61,10 +61,10 @@ def sofa_python(net: Net) -> str:
         arrows = float(f"{float(net.rest_lengths.mean()):.6g}") / float(np.abs(net.forces).max())
         data = {"forces": _positions(net.forces[loaded]), "showArrowSize": f"{arrows:.6g}"}
         sheet.append(_vec3("ConstantForceField", name="load", indices=numbers(loaded), **data))
-    said = "the one here is below it"
+    step_note = "the one here is below it"
     if simulation.loaded_frequency:
         share = f"a {STEPS_PER_PERIOD}th of the slowest period that the load excites"
-        said = f"the one here is that of backward Euler, {share}"
+        step_note = f"the one here is that of backward Euler, {share}"
     predicted = []
     if simulation.displacements is not None:
         shown = {"showObject": "1", "showObjectScale": "4", "showColor": "0.1 0.6 0.2 1"}
@@ -72,7 +72,7 @@ def sofa_python(net: Net) -> str:
         predicted = [_vec3("MechanicalObject", name="particles", position=moved, **shown)]
     return fill_template(
         "sofa.py",
-        about=comment_lines(net, simulation, said),
+        about=comment_lines(net, simulation, step_note),
         step=simulation.implicit_step,
         plugins=PLUGINS,
         backward_euler=BACKWARD_EULER,

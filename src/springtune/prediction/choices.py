@@ -1,4 +1,4 @@
-"""Which definition and stiffness to use on a mesh, and how far off it is: solved, with linear kinematics.
+"""Definitions and stiffnesses to use on a mesh, with their errors, solved in linear kinematics.
 
 All registered definitions that suit the mesh and the materials are solved on the mesh itself under some loads and
 compared with the converged reference of small strain. The best ones are kept, of all and of springs alone. A patch test

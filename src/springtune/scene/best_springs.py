@@ -56,17 +56,12 @@ class BestSprings(Tabled):
     --------
     >>> import springtune as st
     >>> beam, third = st.Beam("60 mm", "20 mm"), st.Material("1 MPa", 1 / 3)
-    >>> mesh = st.make_mesh(beam, "free", "5 mm")
-    >>> found = st.best_springs(mesh, third, "1 mm", starts=["van-gelder"])
+    >>> found = st.best_springs(st.make_mesh(beam, "free", "5 mm"), third, "1 mm", starts=["van-gelder"])
     >>> found.lower_bound < found.stretch_error
     True
-
-    As a definition of its own mesh, and for other programs:
-
     >>> scene = st.Scene(beam, found.mesh, third, "bending", "1 N", definition=found, kinematics="linear")
-    >>> net = st.SpringNet.from_scene(scene)
-    >>> bool(scene.solve().error == found.errors["bending"]), bool((net.stiffness > 0).all())
-    (True, True)
+    >>> bool(scene.solve().error == found.errors["bending"])
+    True
     """
 
     springs: Springs
@@ -90,18 +85,7 @@ class BestSprings(Tabled):
 
     @cached_property
     def errors(self) -> dict[str, float]:
-        """Displacement errors [1] under traction, bending, shear and pressure, which are not fitted.
-
-        With linear kinematics, as of `springtune.Result.error`; empty where the mesh is no full rectangle.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("60 mm", "20 mm"), "free", "5 mm")
-        >>> found = st.best_springs(mesh, st.Material("1 MPa", 1 / 3), "1 mm", starts=["van-gelder"], evaluations=50)
-        >>> list(found.errors), abs(found.errors["traction"]) < 0.05
-        (['traction', 'bending', 'shear', 'pressure'], True)
-        """
+        """Displacement errors [1] under loads that are not fitted, linear kinematics; empty on meshes of no box."""
         from .single import Scene
 
         length, height = self.mesh.points.max(axis=0)
@@ -143,6 +127,8 @@ def best_springs(
 ) -> BestSprings:
     """Search for the stiffness of each spring with the least error over a space of loads and the field inside.
 
+    Loads, objective and the proof of the bound: `springtune.springs.best_springs`.
+
     Parameters
     ----------
     mesh : Mesh
@@ -171,10 +157,6 @@ def best_springs(
         If an argument is unknown or out of its range.
     DefinitionError
         If the mesh has quadrilaterals or several parts, or a start does not support it.
-
-    Notes
-    -----
-    Loads, objective and the proof of the bound: `springtune.springs.best_springs`.
 
     Examples
     --------

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     AnyReference = ReferenceSolution | FiniteStrainSolution | ShapeReference
 
 A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
-"""How a mesh with groups is made, for messages."""
+"""Call that makes a mesh with groups, for messages."""
 
 
 class BoundaryProblem(ABC):
@@ -238,7 +238,7 @@ class BeamProblem(BoundaryProblem):
         return {"displacement": self.reference(law).displacement}
 
     def law(self, definition: Definition) -> str:
-        """Law of the reference: of beams that of rubber alone."""
+        """Law of the reference at finite strain: rubber's, or none."""
         return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
 
 

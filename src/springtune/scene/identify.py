@@ -44,7 +44,7 @@ USUAL_POISSON_RATIOS = {"nu": 0.3, "nu12": 0.3}
 
 REMEDIES = {"G12": "add a test in shear, or of a coupon cut at 45 degrees", "E2": "add a coupon cut across"}
 REMEDIES |= dict.fromkeys(USUAL_POISSON_RATIOS, "add a transverse displacement or a field, or give it as known")
-"""What to add where a constant is not determined; for others a force."""
+"""Test to add where a constant is not determined; for others a force."""
 
 LEAST_DERIVATIVE = 1e-7
 """Derivative by a constant besides those by others, over the largest, below which tests do not tell the constant."""
@@ -92,7 +92,7 @@ def assume_usual(constants: dict[str, Any], names: Iterable[str]) -> dict[str, A
 
 
 def limit_anisotropy(constants: dict[str, Any]) -> dict[str, Any]:
-    """Constants of a material that elements can follow, where those of an orthotropic one are extreme."""
+    """Limit the ratios of orthotropic constants to those that finite elements can follow."""
     if "G12" not in constants:
         return constants
     middle = sorted([constants["E1"], constants["E2"], 2.6 * constants["G12"]])[1]
@@ -438,7 +438,7 @@ def _scale(model: Model, constants: dict[str, Any]) -> float:
 def _fitted(
     model: Model, constants: dict[str, Any], free: Sequence[str]
 ) -> tuple[list[str], dict[str, Any], list[np.ndarray], np.ndarray, np.ndarray]:
-    """What tests do not tell, and `Model.fit` of the others; refuses fields of other loads."""
+    """Undetermined constants, and `Model.fit` of the others; refuse fields of other loads."""
     lacking = model.undetermined(constants, free)
     names = [name for name in free if name not in lacking]
     constants, tables, noise, half = model.fit(assume_usual(constants, lacking), names)

@@ -1,4 +1,4 @@
-"""What scenes of a mesh share, and the recipe of a scene: springs, network, problem, equilibrium, judged."""
+"""Cache that scenes of a mesh share, and the recipe of a scene: springs, network, problem, equilibrium, judgement."""
 
 import hashlib
 import time
@@ -73,7 +73,7 @@ def naming_errors(definition: Definition) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """What a load of factor 1 does to the particles of a mesh; arrays have shape (n_points, 2).
+    """Supports and forces of a load of factor 1 on a mesh; arrays have shape (n_points, 2).
 
     `held` directions are fixed or moved by `given` [m]. `pattern` are the forces at rest [N], of which `dead` keep
     their direction and `follower` turns with its sides; `dead` is None where the pattern is all of one sort.

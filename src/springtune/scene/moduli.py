@@ -15,28 +15,22 @@ from .meshes import A_MATERIAL, A_MESH, is_a
 
 @dataclass(frozen=True)
 class Moduli:
-    """Effective moduli of a network.
+    """Effective moduli of a network; Young's modulus, Poisson's ratio and shear modulus are NaN if it is not isotropic.
 
     Attributes
     ----------
     young_modulus_error : float
-        Young's modulus along x between rollers over the material's, less one [1]; where the mesh is no strip, that
-        under affine displacements of its outline, mean over all directions.
+        Young's modulus along x over the material's, less one [1].
     poisson_ratio : float
         Poisson's ratio there [1].
     shear_modulus_error : float
-        Shear modulus under even shear of the outline over the material's, less one [1].
+        Shear modulus over the material's, less one [1].
     springs : Springs
         Of a sheet that is 1 m thick: moduli do not depend on the thickness.
     seconds : float
         That deriving the springs took.
     mesh : Mesh
     material : Material or AnisotropicMaterial
-        What they were derived from.
-
-    Notes
-    -----
-    Young's modulus, Poisson's ratio and shear modulus are NaN where the material is not isotropic.
 
     Examples
     --------
@@ -47,8 +41,12 @@ class Moduli:
     >>> found = st.moduli(mesh, st.Material("210 GPa", 0.3), "lattice")
     >>> f"{abs(found.young_modulus_error):.4f} {found.poisson_ratio:.4f} {found.shear_modulus_error:+.4f}"
     '0.0000 0.3333 -0.0250'
-    >>> f"{1.3 / (1 + 1 / 3) - 1:+.4f}"  # shear modulus E / (2 (1 + nu)) of the network over the material's, less one
-    '-0.0250'
+
+    They always have C12 = C66:
+
+    >>> found = st.moduli(mesh, st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa"), "energy-fit")
+    >>> print((abs(found.stiffness) / 1e9).round(2).tolist(), f"{found.stiffness_error:.1%}")
+    [[9.29, 1.91, 0.0], [1.91, 4.13, 0.0], [0.0, 0.0, 1.91]] 6.4%
     """
 
     young_modulus_error: float
@@ -63,21 +61,7 @@ class Moduli:
     def stiffness(self) -> np.ndarray:
         """Stiffness in plane stress [Pa], shape (3, 3), as of `Material.plane_stress`; NaN where loads change it.
 
-        The whole outline is strained evenly, on any mesh and of any anisotropy: see
-        `springtune.mechanics.moduli.PatchTest.stiffness`.
-
-        Examples
-        --------
-        Springs alone always have C12 = C66:
-
-        >>> import springtune as st
-        >>> board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa")
-        >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "braced", "5 mm")
-        >>> for name in ("orthotropic", "energy-fit"):
-        ...     found = st.moduli(mesh, board, name)
-        ...     print(name, (abs(found.stiffness) / 1e9).round(2).tolist(), f"{found.stiffness_error:.1%}")
-        orthotropic [[9.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 2.0]] 0.0%
-        energy-fit [[9.29, 1.91, 0.0], [1.91, 4.13, 0.0], [0.0, 0.0, 1.91]] 6.4%
+        By even strains of the whole outline, see `springtune.mechanics.moduli.PatchTest.stiffness`.
         """
         if self.springs.lateral:
             return np.full((3, 3), np.nan)
@@ -85,15 +69,7 @@ class Moduli:
 
     @property
     def stiffness_error(self) -> float:
-        """Norm of the difference of `stiffness` from the material's, over the norm of the material's [1].
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "free", "5 mm")
-        >>> round(st.moduli(mesh, st.AnisotropicMaterial(9.0, 4.0, 1.5, 2.0, C16=0.5), "delingette").stiffness_error, 9)
-        0.0
-        """
+        """Norm of the difference of `stiffness` from the material's, over the norm of the material's [1]."""
         wanted = self.material.in_plane.plane_stress
         # Twice the shear and its couplings: the norm of the tensor, which no turn of the axes changes.
         weights = np.sqrt([1.0, 1.0, 2.0])
@@ -110,7 +86,7 @@ class MeshModuli:
         self._found: dict[tuple[object, ...], tuple[float, float, float]] = {}
 
     def __call__(self, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
-        """As `moduli`."""
+        """Moduli of a definition, see `moduli`."""
         springs, seconds = self.sheet.derive(definition, material)
         origin = springs, seconds, self.sheet.mesh, material
         if not isinstance(material, Material):
@@ -127,7 +103,11 @@ class MeshModuli:
 
 
 def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
-    """Effective moduli of a definition on a mesh, by patch tests with an even strain.
+    """Measure the effective moduli of a definition on a mesh, by patch tests with an even strain.
+
+    Young's modulus and Poisson's ratio are those of a strip whose ends are moved apart and slide; where the mesh is no
+    strip, means over all directions under affine displacements of the outline. The shear modulus is of even shear of
+    the outline. See `springtune.mechanics.moduli`. Rows of triangles that are stretched to fit a box are not isotropic.
 
     Parameters
     ----------
@@ -149,15 +129,6 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
         If the network is singular or unstable at rest.
     MeshError
         If the mesh is no strip and the springs go with a lateral stress.
-
-    Notes
-    -----
-    Young's modulus is F L / (u H t) and Poisson's ratio that of the mean strains where the ends of the mesh are
-    moved apart by u and slide; where the mesh is no strip between straight faces, 1/E and nu/E are means over all
-    directions under affine displacements of the whole outline, holes included; the shear modulus is the work of the
-    outline, sheared evenly by an angle, over that angle's square and the volume; see `springtune.mechanics.moduli`.
-    They are those of the mesh that is given: rows of triangles that are fitted to a box are stretched, and not
-    isotropic.
 
     Examples
     --------

@@ -32,12 +32,6 @@ def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | st
     -------
     GroupedMesh
 
-    Raises
-    ------
-    ValueError
-        If the shape has the mesh of a file, or a size is not above zero, larger than the
-        shape or absurdly small.
-
     Examples
     --------
     >>> import springtune as st
@@ -52,9 +46,9 @@ def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | st
 
 
 def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
-    """Read the mesh of a shape with its groups, of Gmsh, Abaqus, MED or VTU.
+    """Read the mesh of a shape with its groups, of any format that meshio knows.
 
-    Groups are Gmsh's physical groups, sets of Abaqus, groups of MED, and arrays of zeros and
+    Groups are Gmsh's physical groups, sets of cells and of points in Abaqus and other files, and arrays of zeros and
     ones in VTU; the guide on mesh files says how each becomes sides, a point or a part.
 
     Parameters
@@ -66,11 +60,6 @@ def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
     Returns
     -------
     GroupedMesh
-
-    Raises
-    ------
-    MeshError
-        If the file cannot be read, or its cells are no conforming plane sheet.
 
     Examples
     --------

@@ -497,7 +497,7 @@ class Result(Tabled):
     >>> print(f"error {100 * result.error:+.2f} %, {result.sign_word}", result.sign_words, list(result.errors))
     error +3.52 %, too soft {'displacement': 'too soft'} ['displacement']
     >>> result.write("traction.vtu")[0].name, result.plot().get_title(loc="left")
-    ('traction.vtu', 'traction of 400000 N: 9.832 mm')
+    ('traction.vtu', 'traction of 400000 N: 9.835 mm')
     >>> result.displacements.shape, result.stiffness.shape, result.spring_forces.shape
     ((415, 2), (1143,), (1143,))
     >>> print(f"{result.stiffness.max():.4g} N/m, at most {1e-3 * result.spring_forces.max():.1f} kN in a spring")
@@ -588,12 +588,12 @@ class Result(Tabled):
 
     @property
     def errors(self) -> dict[str, float]:
-        """As `error`, of each quantity of interest [1]; NaN where the reference has none of it, or exactly zero."""
+        """Error of each quantity of interest, see `error` [1]; NaN where the reference is missing or zero."""
         return quantity_errors(self.values, self.scene.reference_values())
 
     @property
     def sign_word(self) -> str:
-        """What the sign of `error` means: ``"too soft"`` or ``"too stiff"``; empty without an error.
+        """Sign of `error` in words: ``"too soft"`` or ``"too stiff"``; empty without an error.
 
         Of a quantity other than a displacement ``"too large"`` or ``"too small"``.
         """
@@ -601,7 +601,7 @@ class Result(Tabled):
 
     @property
     def sign_words(self) -> dict[str, str]:
-        """As `sign_word`, of each quantity of interest by name."""
+        """Sign of the error in words by quantity of interest, see `sign_word`."""
         known = self.scene.reference_values()
         kinds = {one.name: one.kind for one in self.scene.boundary_problem.case.quantities}
         return {name: sign_word(error, known.get(name, np.nan), kinds[name]) for name, error in self.errors.items()}
