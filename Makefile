@@ -14,7 +14,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 # Jobs and tests are many processes: Python is to keep what it compiles.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: study report paper test slow lint docs site pictures lock test-browser test-engines test-slurm mutants clean
+.PHONY: million study report paper test slow lint docs site pictures lock test-browser test-engines test-slurm mutants clean
 
 study: $(VENV)/.run
 	springtune run "$$STUDY"
@@ -105,12 +105,15 @@ results/quick/dataset.nc: | $(VENV)/.run
 	snakemake --configfile config/quick.yaml
 
 # The pictures and tables of the pages, from their studies, and what is measured on this machine: docs/scale.md and a
-# million particles in docs/speed.md. Half an hour and 3 GB.
+# million particles in docs/speed.md. Half an hour and 3 GB. `make million JUDGE=/other/.venv/bin/python` compares solves.
 pictures: $(VENV)/.run $(ENGINES)/.done
 	$(WITH_ENGINES) python tools/pictures.py
 	python tools/pages.py
 	OPENBLAS_NUM_THREADS=1 python tools/million.py --write
 	python tools/scale.py --write
+
+million: $(VENV)/.run
+	OPENBLAS_NUM_THREADS=1 python tools/million.py $(if $(JUDGE),--judge $(JUDGE))
 
 # Stamps: nothing is installed again until a requirement changes.
 $(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/test.txt pyproject.toml tools/setup.sh
