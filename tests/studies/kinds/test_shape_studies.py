@@ -13,7 +13,7 @@ from springtune.cli import main
 from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
-from springtune.studies.kinds.bodies.plan import shape_mesh_key, shape_reference_task, shape_scene_task
+from springtune.studies.kinds.bodies.plan import shape_mesh_keys, shape_reference_task, shape_scene_task
 from springtune.studies.kinds.bodies.shape_expand import LARGEST_FILE_CHECKED
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
@@ -57,15 +57,15 @@ def test_keys_know_no_labels(load):
     text = COOK.replace("cook", "panel").replace("shear:", "other:").replace("third", "soft")
     text = text.replace("tip: {displacement", "end: {displacement").replace("23.96 mm, source: somebody", "24 mm")
     two = load(text, "two.yaml")
+    assert [*shape_mesh_keys(one).values()] == [*shape_mesh_keys(two).values()]
     for first, second in zip(one.shapes.scenes, two.shapes.scenes):
-        assert shape_mesh_key(one, first) == shape_mesh_key(two, second)
         assert shape_scene_task(one, first)["key"] == shape_scene_task(two, second)["key"]
     assert (
         shape_reference_task(one, "cook", "third", "shear")["key"]
         == shape_reference_task(two, "panel", "soft", "other")["key"]
     )
     stiffer = load(COOK.replace("1 MPa", "2 MPa"), "stiffer.yaml")
-    assert shape_mesh_key(one, one.shapes.scenes[0]) == shape_mesh_key(stiffer, stiffer.shapes.scenes[0])
+    assert shape_mesh_keys(one) == shape_mesh_keys(stiffer)
     assert (
         shape_scene_task(one, one.shapes.scenes[0])["key"] != shape_scene_task(stiffer, stiffer.shapes.scenes[0])["key"]
     )
@@ -167,14 +167,13 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
     assert abs(float(cell.error)) < 0.01
     # The file is part of the keys, its place is not.
-    before = shape_mesh_key(study, study.shapes.scenes[0])
+    before = shape_mesh_keys(study)
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "plate.vtu").rename(tmp_path / "elsewhere/plate.vtu")
     moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.vtu"}}}
-    part = load(yaml.safe_dump(moved), "moved.yaml")
-    assert shape_mesh_key(part, part.shapes.scenes[0]) == before
+    assert shape_mesh_keys(load(yaml.safe_dump(moved), "moved.yaml")) == before
     write_mesh(tmp_path / "elsewhere/plate.vtu", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
-    assert shape_mesh_key(part, part.shapes.scenes[0]) != before
+    assert shape_mesh_keys(load(yaml.safe_dump(moved), "moved.yaml")) != before
 
 
 @pytest.mark.parametrize(

@@ -374,10 +374,14 @@ def shape_mesh_source(study, one):
     return source | {"mesh_size": one.mesh_size, "refined": refined}
 
 
-def shape_mesh_key(study, one):
-    """Key of the mesh of a shape."""
-    code = stage_key("studies.kinds.bodies.mesh"), _reader_key(study.shape(one.shape))
-    return hash_of(parameters(shape_mesh_source(study, one)), *code)
+@cache_by_study
+def shape_mesh_keys(study):
+    """Keys of the meshes of shapes by their stem."""
+    code = stage_key("studies.kinds.bodies.mesh")
+    return {
+        name: hash_of(parameters(shape_mesh_source(study, one)), code, _reader_key(study.shape(one.shape)))
+        for name, (one, *_) in shape_scenes_by_mesh(study).items()
+    }
 
 
 def _reader_key(shape):
@@ -385,6 +389,7 @@ def _reader_key(shape):
     return mesh_type_key(MESH_OF_FILE) if shape.file else ""
 
 
+@lru_cache(maxsize=1024)
 def _case_values(study, shape, material, name):
     """Thickness, load and materials of a scene; with densities only under gravity."""
     from .task_values import load
@@ -408,8 +413,8 @@ def shape_scene_task(study, one):
     """Task of a scene of a shape."""
     code = stage_key("studies.kinds.bodies.solve", without=WITHOUT_FINITE_STRAIN), definition_key(one.definition)
     task = _case_values(study, one.shape, one.material, one.load)
-    task |= {"definition": one.definition, "kinematics": one.kinematics}
-    key = hash_of(shape_mesh_key(study, one), task, code)
+    task = task | {"definition": one.definition, "kinematics": one.kinematics}
+    key = hash_of(shape_mesh_keys(study)[shape_stem(one)], task, code)
     kept = SHAPES_OUTPUT in study.outputs and one in drawn_scenes(study)
     return {"key": key} | task | ({"keep_fields": True} if kept else {})
 
@@ -430,8 +435,8 @@ def _mesh_tasks(study):
         count, own = particles(mesh.beam.length * mesh.beam.height, mesh.mesh_size), curves.get(mesh, ())
         yield _mesh_task(stem(mesh), mesh_source(mesh), mesh_key(mesh), count, scenes, own)
     for name, scenes in shape_scenes_by_mesh(study).items():
-        source, key = shape_mesh_source(study, scenes[0]), shape_mesh_key(study, scenes[0])
-        yield _mesh_task(name, source, key, shape_particles(study, scenes[0]), scenes)
+        source, count = shape_mesh_source(study, scenes[0]), shape_particles(study, scenes[0])
+        yield _mesh_task(name, source, shape_mesh_keys(study)[name], count, scenes)
 
 
 def _reference_tasks(study):
