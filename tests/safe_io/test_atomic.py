@@ -57,7 +57,7 @@ def test_what_another_machine_writes_stays_for_an_hour(tmp_path):
     atomic.remove_unfinished(tmp_path)
     assert len(list(tmp_path.iterdir())) == 2
     for path in tmp_path.iterdir():
-        os.utime(path, (time.time() - atomic.FORGOTTEN - 1,) * 2)
+        os.utime(path, (time.time() - atomic.ABANDONED_SECONDS - 1,) * 2)
     atomic.remove_unfinished(tmp_path)
     assert not list(tmp_path.iterdir())
 

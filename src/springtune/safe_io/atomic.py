@@ -9,10 +9,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-UNFINISHED = ".unfinished"
+UNFINISHED_ENDING = ".unfinished"
 """Ending of the name of a file that is being written, after its own and who writes it, `writer`."""
 
-FORGOTTEN = 3600.0
+ABANDONED_SECONDS = 3600.0
 """Seconds after which another machine's unfinished file counts as left over; writing takes seconds."""
 
 
@@ -29,7 +29,7 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f"{path.name}.{writer()}{UNFINISHED}")
+    unfinished = path.with_name(f"{path.name}.{writer()}{UNFINISHED_ENDING}")
     try:
         yield unfinished
         if synced:
@@ -61,9 +61,9 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
 
     On another machine a process counts as running if it wrote within the last hour.
     """
-    for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED}"):
+    for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED_ENDING}"):
         with suppress(FileNotFoundError):  # just finished, or another run was quicker
-            if path.is_file() and not _is_written(path):
+            if path.is_file() and not _is_being_written(path):
                 path.unlink()
 
 
@@ -75,11 +75,11 @@ def to_present(folder: str | Path) -> None:
             os.utime(path)
 
 
-def _is_written(path: Path) -> bool:
+def _is_being_written(path: Path) -> bool:
     """Whether the process that writes an unfinished file lives, or may live."""
-    number, _, host = path.name.removesuffix(UNFINISHED).rpartition(".")[2].partition("@")
+    number, _, host = path.name.removesuffix(UNFINISHED_ENDING).rpartition(".")[2].partition("@")
     if host not in ("", writer().partition("@")[2]):
-        return time.time() < path.stat().st_mtime + FORGOTTEN
+        return time.time() < path.stat().st_mtime + ABANDONED_SECONDS
     return number.isdecimal() and lives(int(number))
 
 

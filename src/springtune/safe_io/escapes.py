@@ -53,10 +53,10 @@ def xml_comment(text: str) -> str:
     return re.sub("-(?=-)", "- ", printable(text))
 
 
-LONGEST_SHOWN = 60
+SHOWN_CHARACTERS = 60
 
 
-def clipped(text: str, longest: int = LONGEST_SHOWN) -> str:
+def clipped(text: str, longest: int = SHOWN_CHARACTERS) -> str:
     """Return a text as `shown`, shortened for a message."""
     return shown(text if len(text) <= longest else f"{text[: longest - 3]}...")
 

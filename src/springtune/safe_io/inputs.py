@@ -17,7 +17,7 @@ LARGEST_CSV = 5_000_000
 """Bytes of the largest CSV file that is read."""
 
 
-_bounds = threading.RLock()
+_memory_lock = threading.RLock()
 """Lock: a memory limit applies to the whole process."""
 
 
@@ -157,7 +157,7 @@ def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
     limit works only in the main thread. Without support by the system there is no limit, and a tighter memory limit
     stays.
     """
-    with _bounds, _timed(seconds):
+    with _memory_lock, _time_limit(seconds):
         used = virtual_memory()
         if not used:
             yield
@@ -181,7 +181,7 @@ def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
 
 
 @contextmanager
-def _timed(seconds: float) -> Iterator[None]:
+def _time_limit(seconds: float) -> Iterator[None]:
     """Context that ends by BeyondBound after some seconds of the processor."""
     if not seconds or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield

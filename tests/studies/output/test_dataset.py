@@ -17,7 +17,7 @@ from springtune.studies.config.kind import modules
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
-from springtune.studies.output.dataset import CHUNK, Group
+from springtune.studies.output.dataset import CHUNK_BYTES, Group
 from springtune.studies.runs import provenance
 from springtune.studies.runs.source import clone, workflow_folder
 
@@ -83,7 +83,7 @@ def test_arrays_are_read_when_needed_and_by_chunks(tmp_path):
     dataset.write(tmp_path / "dataset.nc", {"/": curves}, VERSION)
     with h5py.File(tmp_path / "dataset.nc") as file:
         chunk = file["displacement"].chunks
-        assert chunk[-1] == 5000 and CHUNK / 4 <= 8 * np.prod(chunk) <= CHUNK
+        assert chunk[-1] == 5000 and CHUNK_BYTES / 4 <= 8 * np.prod(chunk) <= CHUNK_BYTES
         assert file["best_stiffness"].chunks is None  # small
     with st.open(tmp_path) as tree:
         assert "..." in repr(tree.displacement.variable) or "values with dtype" in repr(tree.displacement.variable)

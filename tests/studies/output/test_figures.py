@@ -15,7 +15,7 @@ from PIL import Image
 import springtune as st
 from springtune.studies.config.kind import outputs
 from springtune.studies.output import style
-from springtune.studies.output.drawing import NETWORK_LINE
+from springtune.studies.output.drawing import NETWORK_LINE_WIDTH
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import closure
 
@@ -117,7 +117,7 @@ def test_springs_of_a_deformed_network_join_its_moved_particles(tree):
     here = tree["fields"].to_dataset().sel(SCENES).sel(beam="100x20", definition="area", mesh_size=5e-3)
     title = panel.get_title("left")
     scale = float(title.rpartition("×\u00a0")[2])
-    springs = next(line for line in panel.get_lines() if line.get_linewidth() == NETWORK_LINE)
+    springs = next(line for line in panel.get_lines() if line.get_linewidth() == NETWORK_LINE_WIDTH)
     x = 1e3 * (here.x + scale * here.displacement_x).values
     assert springs.get_xdata() == pytest.approx(
         [x[0], x[1], np.nan, x[1], x[2], np.nan, x[2], x[3], np.nan], nan_ok=True

@@ -84,7 +84,7 @@ def check_texts(figure, boxes):
     width, height = 72 * figure.get_size_inches()
     for text, box in boxes.items():
         said = repr(text.get_text())
-        assert text.get_fontsize() >= style.SMALL, said
+        assert text.get_fontsize() >= style.SMALL_TEXT, said
         assert box.x0 >= -1 and box.x1 <= width + 1 and box.y0 >= -1 and box.y1 <= height + 1, said
     for one, other in combinations(boxes, 2):
         a, b = boxes[one], boxes[other]
@@ -96,7 +96,7 @@ def check_texts(figure, boxes):
 @each
 def test_a_figure_is_what_a_journal_takes(tree, plot):
     figure = np.ravel(plot(tree, **EVERY_PLOT[plot][0]))[0].figure
-    assert figure.get_size_inches()[0] in (style.COLUMN, style.PAGE)
+    assert figure.get_size_inches()[0] in (style.COLUMN_WIDTH, style.PAGE_WIDTH)
     made, boxes = files(figure)
     check_fonts(made["pdf"])
     check_texts(figure, boxes)
@@ -131,7 +131,7 @@ def lab(colour, sight):
 @pytest.mark.parametrize("sight", BLIND)
 def test_lines_are_told_apart_by_the_colour_blind(sight):
     """A difference of 10 is seen at a glance; 2.3 is just noticeable."""
-    seen = [lab(look["color"], sight) for look in style.LINES]
+    seen = [lab(look["color"], sight) for look in style.LINE_STYLES]
     nearest = min(np.linalg.norm(one - other) for one, other in combinations(seen, 2))
     assert nearest > 10
 

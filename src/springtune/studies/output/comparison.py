@@ -17,13 +17,23 @@ from springtune.problem.quantities import nearest
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
 from .text import NUMBER, from_json, without_numbers
 
-RELATIVE = 1e-6
+RELATIVE_TOLERANCE = 1e-6
 """Default relative tolerance."""
 
-MEASURED = ("seconds", "*_seconds", "seconds_*", "solver", "spring_updates")
+MEASURED_VARIABLES = ("seconds", "*_seconds", "seconds_*", "solver", "spring_updates")
 """Variables that depend on the machine."""
 
-UNTOLD = {"created", "history", "config", "config_sha256", "software", "inputs", "source", "Conventions", "references"}
+HIDDEN_ATTRIBUTES = {
+    "created",
+    "history",
+    "config",
+    "config_sha256",
+    "software",
+    "inputs",
+    "source",
+    "Conventions",
+    "references",
+}
 """Attributes that are not told as they are."""
 
 Labels = dict[str, str | float]
@@ -37,7 +47,7 @@ class Tolerance:
     None is 0, or `relative` for numbers without unit.
     """
 
-    relative: float = RELATIVE
+    relative: float = RELATIVE_TOLERANCE
     absolute: float | None = None
 
 
@@ -75,7 +85,7 @@ class VariableChanges:
 
 
 @dataclass(frozen=True)
-class Alone:
+class CellsOfOne:
     """Cells of only one dataset: their number, and the labels of the first."""
 
     count: int = 0
@@ -91,7 +101,7 @@ class GroupChanges:
     sizes: dict[str, int] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     labels: dict[str, tuple[list[str | float], ...]] = field(default_factory=dict)
-    cells: tuple[Alone, ...] = (Alone(), Alone())
+    cells: tuple[CellsOfOne, ...] = (CellsOfOne(), CellsOfOne())
     unlike: dict[str, str] = field(default_factory=dict)
     flags: list[VariableChanges] = field(default_factory=list)
     values: list[VariableChanges] = field(default_factory=list)
@@ -134,7 +144,7 @@ def compare(
     """Compare two datasets by label; of each variable so many changes are listed.
 
     Numeric labels match in nine digits; NaN equals NaN. Values of cells that one study does not request
-    are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out.
+    are not compared. Numbers inside texts are compared as numbers. `MEASURED_VARIABLES` is left out.
 
     Examples
     --------
@@ -151,7 +161,7 @@ def compare(
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
             raise ValueError(f"--ignore {pattern}: neither has it; {nearest(pattern, held)}")
-    left_out = {name for name in held if any(fnmatchcase(name, one) for one in (*MEASURED, *ignored))}
+    left_out = {name for name in held if any(fnmatchcase(name, one) for one in (*MEASURED_VARIABLES, *ignored))}
     known = sorted({*nodes[0], *nodes[1]})
     wanted = {"/" + name.strip("/") for name in groups} or {*known}
     for name in sorted(wanted - {*known}):
@@ -160,11 +170,11 @@ def compare(
     chosen = [[path for path in side if path in wanted] for side in nodes]
     both = {path: [side[path] for side in nodes] for path in chosen[0] if path in chosen[1]}
     found = [_compare_group(one, pair, roots, left_out, tolerance or Tolerance(), most) for one, pair in both.items()]
-    facts = [_facts(tree.attrs) for tree in (before, after)]
+    facts = [_noted_attributes(tree.attrs) for tree in (before, after)]
     noted = {name: (facts[0].get(name, ""), facts[1].get(name, "")) for name in facts[0] | facts[1]}
     inputs = [from_json(tree.attrs.get("inputs")) for tree in (before, after)]
     noted |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
-    return Comparison(found, _only(chosen), {name: pair for name, pair in noted.items() if pair[0] != pair[1]})
+    return Comparison(found, _names_of_one(chosen), {name: pair for name, pair in noted.items() if pair[0] != pair[1]})
 
 
 def _rounded(data: xr.Dataset) -> xr.Dataset:
@@ -177,16 +187,16 @@ def _rounded(data: xr.Dataset) -> xr.Dataset:
     return data
 
 
-def _only(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
+def _names_of_one(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
     """Names of each side that the other has not."""
     one, other = sides
     return [name for name in one if name not in other], [name for name in other if name not in one]
 
 
-def _facts(attributes: Mapping[Hashable, object]) -> dict[str, str]:
+def _noted_attributes(attributes: Mapping[Hashable, object]) -> dict[str, str]:
     """Attributes to tell, and versions of packages."""
     found = {str(name): value for name, value in attributes.items()} | from_json(attributes.get("software"))
-    return {name: str(value) for name, value in found.items() if name not in UNTOLD}
+    return {name: str(value) for name, value in found.items() if name not in HIDDEN_ATTRIBUTES}
 
 
 def _compare_group(
@@ -203,7 +213,7 @@ def _compare_group(
     asked = [_asked(data, root) for data, root in zip(pair, roots)]
     dimensions = _cell_dimensions(given, roots)
     names = [[str(name) for name in data.data_vars if name not in left_out] for data in pair]
-    found = GroupChanges(path, variables=_only(names))
+    found = GroupChanges(path, variables=_names_of_one(names))
     for name in dict.fromkeys(str(name) for data in pair for name in data.dims):
         axes = [data.indexes[name] for data in pair if name in data.dims]
         axis, other = axes[0], axes[-1]
@@ -236,7 +246,7 @@ def _why_unlike(one: xr.DataArray, other: xr.DataArray) -> str:
     return f"has other units: {units[0]} before, {units[1]} after" if len(set(units)) > 1 else ""
 
 
-def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int | None) -> tuple[Alone, ...]:
+def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int | None) -> tuple[CellsOfOne, ...]:
     """Cells that only one side requests, of each side."""
     masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
     alone = []
@@ -245,7 +255,7 @@ def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int
         there = other.reindex_like(mask, fill_value=False).transpose(*mask.dims).values
         places = np.flatnonzero(mask.values & ~there)
         rows = [_labels(mask, np.unravel_index(place, mask.shape)) for place in places[:most]]
-        alone.append(Alone(len(places), rows))
+        alone.append(CellsOfOne(len(places), rows))
     return tuple(alone)
 
 

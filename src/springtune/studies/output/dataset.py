@@ -147,18 +147,18 @@ UGRID: dict[str, dict[str, object]] = {
 }
 """Attributes of unstructured meshes by UGRID-1.0, see `Group.further`."""
 
-OF_PARTICLES: dict[str, object] = {"mesh": "mesh", "location": "node"}
-OF_SPRINGS: dict[str, object] = {"mesh": "mesh", "location": "edge"}
+PARTICLE_ATTRIBUTES: dict[str, object] = {"mesh": "mesh", "location": "node"}
+SPRING_ATTRIBUTES: dict[str, object] = {"mesh": "mesh", "location": "edge"}
 """Attributes of variables of particles or springs."""
 
-CHUNK = 2**18
+CHUNK_BYTES = 2**18
 """Most bytes of a compressed chunk, which is read for each of its cells."""
 
-UNCOMPRESSED = 2**13
+UNCOMPRESSED_BYTES = 2**13
 """Most bytes of an uncompressed array; compressing less costs more than it saves."""
 
 
-MOSTLY_EMPTY = 0.75
+MOSTLY_EMPTY_SHARE = 0.75
 """Share of empty cells above which a large array of texts stores none of them."""
 
 TEXTS_IN_CHUNK = 128
@@ -199,12 +199,16 @@ def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashabl
     for name, array in variables.items():
         fill, values = array.attrs.pop("_FillValue", None), array.values
         texts = values.dtype.kind in "OU"
-        sparse = texts and values.nbytes > CHUNK and np.mean(values == "") > MOSTLY_EMPTY
+        sparse = texts and values.nbytes > CHUNK_BYTES and np.mean(values == "") > MOSTLY_EMPTY_SHARE
         options: dict[str, Any] = {}
         if sparse:
-            options = {"chunks": _chunk(array.shape, TEXTS_IN_CHUNK)}
-        elif not texts and values.nbytes > UNCOMPRESSED:
-            options = {"chunks": _chunk(array.shape, CHUNK // values.itemsize), "compression": "gzip", "shuffle": True}
+            options = {"chunks": _chunk_shape(array.shape, TEXTS_IN_CHUNK)}
+        elif not texts and values.nbytes > UNCOMPRESSED_BYTES:
+            options = {
+                "chunks": _chunk_shape(array.shape, CHUNK_BYTES // values.itemsize),
+                "compression": "gzip",
+                "shuffle": True,
+            }
         dtype = h5py.string_dtype() if texts else values.dtype
         stored = group.create_variable(name, array.dims, dtype, fillvalue=fill, **options)
         stored.attrs.update(array.attrs)
@@ -216,7 +220,7 @@ def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashabl
             stored[cells] = values[cells]
 
 
-def _chunk(shape: Sequence[int], cells: int) -> tuple[int, ...]:
+def _chunk_shape(shape: Sequence[int], cells: int) -> tuple[int, ...]:
     """Chunk shape of so many cells: whole last dimensions, then as many of the others as fit."""
     chunk: list[int] = []
     for length in reversed(shape):
@@ -225,7 +229,7 @@ def _chunk(shape: Sequence[int], cells: int) -> tuple[int, ...]:
     return tuple(chunk)
 
 
-LARGE_ARRAY = 2**20
+LARGE_ARRAY_BYTES = 2**20
 """Larger arrays, in bytes, are read on demand."""
 
 
@@ -235,11 +239,11 @@ def tree(file: h5netcdf.File) -> xr.DataTree:
     for group in (file, *file.groups.values()):
         variables, attributes = H5NetCDFStore(group).load()  # type: ignore[no-untyped-call]
         for array in variables.values():
-            if array.dtype == object and array.nbytes > LARGE_ARRAY:
+            if array.dtype == object and array.nbytes > LARGE_ARRAY_BYTES:
                 del array.encoding["dtype"]  # by which xarray would read texts at the width of the longest one
         data = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
         for one in data.variables.values():
-            if one.nbytes <= LARGE_ARRAY:
+            if one.nbytes <= LARGE_ARRAY_BYTES:
                 one.load()
         groups[group.name] = data
     return xr.DataTree.from_dict(groups)

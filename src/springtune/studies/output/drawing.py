@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from springtune.scene.curve import Curve
 
 
-LARGEST_SHOWN = 100.0
+LARGEST_ERROR_SHOWN = 100.0
 """Largest error of a curve in a plot [%]."""
 
 BEYOND_SMALL_STRAIN = "beyond small strain"
@@ -39,7 +39,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 
     `displacements` has shape (n_points, 2) [m], `forces` (n_edges,) [N].
     """
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2))
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.2))
     largest = float(np.abs(forces).max()) or 1.0
     outline = mesh.points[mesh.edges[mesh.on_outline]]
     panel.add_collection(LineCollection(1e3 * outline, colors="0.6", linewidths=0.7))
@@ -57,7 +57,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 @style.styled
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     """Draw the deformation error over uniform stiffness, and its zero."""
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5))
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.5))
     error, said = 100 * curve.error, []
     unit, written = labels.power_of_ten(float(curve.stiffness.max()))
     panel.axhline(0.0, color="0.6", linewidth=0.7)
@@ -73,7 +73,8 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     known = error[np.isfinite(error)]
     if len(known):  # a beam that buckled errs by thousands
         panel.set_ylim(
-            max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
+            max(min(1.1 * known.min(), 0.0), -LARGEST_ERROR_SHOWN),
+            min(max(1.1 * known.max(), 1.0), LARGEST_ERROR_SHOWN),
         )
         said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
     else:
@@ -85,14 +86,14 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
 @style.styled
 def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places: Mapping[str, np.ndarray]) -> Axes:
     """Draw residuals over the noise of each column or field, over the largest load or coordinate."""
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5))
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.5))
     for number, (label, values) in enumerate(residuals.items()):
         where = places[label]
         along = where if where.ndim == 1 else np.repeat(where[:, 0], 2)
         panel.plot(along / np.abs(along).max(), values, ".", color=style.line(number)["color"], label=label)
     panel.axhline(0.0, color="0.6", linewidth=0.7)
     panel.set(xlabel="Load, or x, over its largest [1]", ylabel="Residual over noise [1]")
-    panel.legend(fontsize=style.SMALL)
+    panel.legend(fontsize=style.SMALL_TEXT)
     return panel
 
 
@@ -111,7 +112,7 @@ def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
     image = panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
     for (row, column), text in np.ndenumerate(texts):
         colour = "white" if shade[row, column] > 1.2 else "0.5" if text == NOT_ASKED else "k"
-        panel.text(column, row, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
+        panel.text(column, row, text, ha="center", va="center", fontsize=style.SMALL_TEXT, color=colour)
     panel.grid(False)
     return image
 
@@ -148,7 +149,7 @@ def magnification(fields: "xr.Dataset") -> float:
     return max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)) * power
 
 
-NETWORK_LINE = 0.35
+NETWORK_LINE_WIDTH = 0.35
 """Width of the lines of springs that have one colour [pt]."""
 
 
@@ -175,7 +176,7 @@ def draw_network(
     panel.set(aspect="equal", adjustable="datalim")
     if not most:  # one line with gaps: thousands of lines take ten times as long
         gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-        panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
+        panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE_WIDTH)
         return None
     width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
     forces = fields.spring_force.values[kept]

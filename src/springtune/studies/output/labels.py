@@ -15,40 +15,42 @@ from matplotlib.ticker import NullLocator
 from springtune.problem.status import Status
 
 from . import style
-from .style import POINTS, SMALL
+from .style import POINTS_PER_INCH, SMALL_TEXT
 
-LINE = 1.22 * SMALL / POINTS
+LINE_HEIGHT = 1.22 * SMALL_TEXT / POINTS_PER_INCH
 """Height of a line of small text [inch]."""
 
-CHARACTER = 0.54
+CHARACTER_WIDTH = 0.54
 """Mean width of a character over its size."""
 
-BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:m|mm|N|kN|Pa|kPa|MPa|GPa|N/m|%)(?:\W|$))")
+SPACE_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:m|mm|N|kN|Pa|kPa|MPa|GPa|N/m|%)(?:\W|$))")
 """Space at which a text is not wrapped."""
 
-WIDEST_NAME = 0.55
+WIDEST_NAME_SHARE = 0.55
 """Largest width of a line's name over that of a panel before its layout."""
 
-POWERS = {0: "", 3: "10³ ", 6: "10⁶ ", 9: "10⁹ "}
+POWERS_OF_TEN = {0: "", 3: "10³ ", 6: "10⁶ ", 9: "10⁹ "}
 
 
 def power_of_ten(largest: float) -> tuple[float, str]:
     """Divisor of an axis and its text before the unit: 1e6 and ``"10⁶ "``."""
-    power = max([power for power in POWERS if largest >= 10 * 10.0**power], default=0)
-    return 10.0**power, POWERS[power]
+    power = max([power for power in POWERS_OF_TEN if largest >= 10 * 10.0**power], default=0)
+    return 10.0**power, POWERS_OF_TEN[power]
 
 
-def wrapped(text: str, room: float, size: float = SMALL) -> str:
+def wrap_to_width(text: str, room: float, size: float = SMALL_TEXT) -> str:
     """Wrap a text at spaces to a width [inch]; a number keeps its unit."""
-    characters = max(1, int(room * POINTS / (CHARACTER * size)))
-    lines = textwrap.wrap(BEFORE_UNIT.sub("\x1f", text), characters, break_long_words=False, break_on_hyphens=False)
+    characters = max(1, int(room * POINTS_PER_INCH / (CHARACTER_WIDTH * size)))
+    lines = textwrap.wrap(
+        SPACE_BEFORE_UNIT.sub("\x1f", text), characters, break_long_words=False, break_on_hyphens=False
+    )
     return "\n".join(lines).replace("\x1f", " ")
 
 
-def fitted(panel: Axes, texts: Iterable[str], size: float = SMALL, share: float = 1.0) -> str:
+def wrap_to_panel(panel: Axes, texts: Iterable[str], size: float = SMALL_TEXT, share: float = 1.0) -> str:
     """Texts, one a line, wrapped to a share of the width of a panel before its layout."""
     room = share * panel.get_window_extent().width / panel.figure.dpi
-    return "\n".join(wrapped(text, room, size) for text in texts if text)
+    return "\n".join(wrap_to_width(text, room, size) for text in texts if text)
 
 
 # -- lines -------------------------------------------------------------------------------------------------------------
@@ -102,21 +104,23 @@ def finish(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[A
     if handles:
         arranged = panel.figure.get_layout_engine() is not None
         place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
-        texts = [fitted(panel, [str(one.get_label())], share=WIDEST_NAME) for one in handles]
+        texts = [wrap_to_panel(panel, [str(one.get_label())], share=WIDEST_NAME_SHARE) for one in handles]
         panel.legend(handles, texts, handlelength=2.2, borderaxespad=0.3, labelspacing=0.35, **place)
     note(panel, said)
 
 
 def note(panel: Axes, texts: Iterable[str]) -> None:
     """Write small texts below a panel's label, wrapped to its width."""
-    if text := fitted(panel, texts):
-        panel.annotate(text, (0, 0), xycoords="axes fraction", xytext=(0, -0.38 * POINTS), va="top",
-                       textcoords="offset points", fontsize=SMALL, color="0.25")  # fmt: skip
+    if text := wrap_to_panel(panel, texts):
+        panel.annotate(text, (0, 0), xycoords="axes fraction", xytext=(0, -0.38 * POINTS_PER_INCH), va="top",
+                       textcoords="offset points", fontsize=SMALL_TEXT, color="0.25")  # fmt: skip
 
 
 def say(panel: Axes, text: str, bare: bool = True) -> None:
     """Write in the middle of an empty panel what is missing and why."""
-    panel.text(0.5, 0.5, fitted(panel, [text], 8), transform=panel.transAxes, ha="center", va="center", color="0.25")
+    panel.text(
+        0.5, 0.5, wrap_to_panel(panel, [text], 8), transform=panel.transAxes, ha="center", va="center", color="0.25"
+    )
     if bare:
         panel.tick_params(which="both", length=0, labelbottom=False, labelleft=False)
         panel.grid(False)
@@ -127,10 +131,10 @@ def entitle(figure: Figure | SubFigure | None, title: str, said: str = "") -> No
     if figure is None:
         return
     width = style.size(figure)[0]
-    figure.suptitle(wrapped(title, width - 0.2, 8.5), x=0.05 / width, ha="left")
+    figure.suptitle(wrap_to_width(title, width - 0.2, 8.5), x=0.05 / width, ha="left")
     if said:
-        said = wrapped(said, width - 0.2)
-        figure.supxlabel(said, x=0.05 / width, ha="left", multialignment="left", fontsize=SMALL, color="0.25")
+        said = wrap_to_width(said, width - 0.2)
+        figure.supxlabel(said, x=0.05 / width, ha="left", multialignment="left", fontsize=SMALL_TEXT, color="0.25")
 
 
 def swatches(colours: Mapping[str, str]) -> list[Patch]:
@@ -155,7 +159,7 @@ def small_multiples(
     `draw` gets a panel and its part; it returns notes, and the reason if it drew no line, see `finish`.
     """
     given = ax is not None and not isinstance(ax, Figure | SubFigure)
-    wide = style.COLUMN if len(shown) == 1 < columns else style.PAGE
+    wide = style.COLUMN_WIDTH if len(shown) == 1 < columns else style.PAGE_WIDTH
     columns = len(shown) if given else min(columns, len(shown))
     rows = -(-len(shown) // columns)
     figure, axes = style.panels(ax, rows, columns, figsize=(wide, height * rows), sharey=sharey)
@@ -163,13 +167,13 @@ def small_multiples(
     for panel in axes.ravel()[len(shown) :]:
         panel.remove()
     for panel, (name, part) in zip(flat, shown.items()):
-        panel.set_title(fitted(panel, [name], 8))
+        panel.set_title(wrap_to_panel(panel, [name], 8))
         notes, why = draw(panel, part)
         finish(panel, notes, why)
-        lines = max(lines, panel.get_title("left").count("\n") + len(fitted(panel, notes).splitlines()))
+        lines = max(lines, panel.get_title("left").count("\n") + len(wrap_to_panel(panel, notes).splitlines()))
         if legend := panel.get_legend():
             names = sum(1.4 + text.get_text().count("\n") for text in legend.get_texts())
-            height = max(height, LINE * names + 0.4)
+            height = max(height, LINE_HEIGHT * names + 0.4)
     for panel in axes[:, 1:].flat if sharey else ():
         panel.set_ylabel("")
     entitle(figure, title, said)
@@ -177,5 +181,7 @@ def small_multiples(
         place: dict[str, Any] = {"loc": "outside upper right", "ncols": len(key)} if figure else {}
         (figure or flat[-1]).legend(handles=key, **place)
     if ax is None and isinstance(figure, Figure):
-        figure.set_size_inches(wide, 0.2 + (height + LINE * lines) * rows + LINE * (bool(said) + bool(key)))
+        figure.set_size_inches(
+            wide, 0.2 + (height + LINE_HEIGHT * lines) * rows + LINE_HEIGHT * (bool(said) + bool(key))
+        )
     return flat

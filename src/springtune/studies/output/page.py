@@ -42,29 +42,31 @@ def html(tables: Iterable[Mapping[str, Any]], tree: xr.DataTree) -> str:
         lstrip_blocks=True,
     )
     root, scenes = tree.to_dataset(), any("marks" in table for table in tables)
-    shown = [dict(table) | {"html": _html(table), "beyond": _beyond(table["rows"])} for table in tables]
+    shown = [
+        dict(table) | {"html": _html_table(table), "beyond": _note_on_left_out_rows(table["rows"])} for table in tables
+    ]
     return environment.get_template("page.html").render(
         tables=shown,
         scenes=scenes,
         sign=sign_of_errors(root) if scenes else "",
-        beams=_beams(root),
+        beams=_beam_sizes(root),
         marks={mark for table in tables for mark in table.get("marks", "")},
         attributes=tree.attrs,
     )
 
 
-def _html(table: Mapping[str, Any]) -> str:
+def _html_table(table: Mapping[str, Any]) -> str:
     """Table without its rows beyond `MOST_ROWS`."""
     cells = table["shown"] if "shown" in table else texts(table["rows"])
     return str(cells.to_html(index=False, border=0)) if len(cells) else ""
 
 
-def _beyond(rows: list[Mapping[str, Any]]) -> str:
+def _note_on_left_out_rows(rows: list[Mapping[str, Any]]) -> str:
     """Note on rows that are left out."""
     return f"The first {MOST_ROWS} of {len(rows)} rows; the file has all of them: " if len(rows) > MOST_ROWS else ""
 
 
-def _beams(root: xr.Dataset) -> list[str]:
+def _beam_sizes(root: xr.Dataset) -> list[str]:
     """Extents of a study's beams; their thickness where it is not swept."""
     names = [name for name in ("beam_length", "beam_height", "beam_thickness") if name in root]
     if not names:
@@ -77,10 +79,10 @@ def _beams(root: xr.Dataset) -> list[str]:
 def texts(rows: list[Mapping[str, Any]]) -> pd.DataFrame:
     """Cells of a table as texts, a number with the digits that its column needs."""
     data = pd.DataFrame(rows)
-    return pd.DataFrame({head(name): _texts(name, data[name].tolist()) for name in data}).head(MOST_ROWS)
+    return pd.DataFrame({head(name): _column_texts(name, data[name].tolist()) for name in data}).head(MOST_ROWS)
 
 
-def _texts(name: str, values: list[Any]) -> list[str]:
+def _column_texts(name: str, values: list[Any]) -> list[str]:
     if any(isinstance(value, str) for value in values):
         return [value if isinstance(value, str) else "–" for value in values]
     short = [f"{value:g}" for value in values]

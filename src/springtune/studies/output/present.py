@@ -65,7 +65,7 @@ def _single(tree: xr.DataTree, output: "Output") -> "Axes":
     from . import style
 
     assert output.draw
-    _, ((panel,),) = style.panels(None, figsize=(style.COLUMN, 2.4))
+    _, ((panel,),) = style.panels(None, figsize=(style.COLUMN_WIDTH, 2.4))
     output.draw(panel, tree[output.name].to_dataset())
     return panel
 

@@ -20,10 +20,10 @@ SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
 
-MOST_HELD = 1e9
+OPENING_BYTES = 1e9
 """Limit of bytes that opening takes."""
 
-LONGEST_REASON = 200
+REASON_CHARACTERS = 200
 
 
 def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
@@ -62,7 +62,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
     with ExitStack() as stack:
         file = stack.enter_context(opened(path))
-        with legible(path), bounded(MOST_HELD):
+        with legible(path), bounded(OPENING_BYTES):
             found = tree(file)
         found.set_close(stack.pop_all().close)
     return found
@@ -75,7 +75,7 @@ def opened(path: str | os.PathLike[str]) -> "Iterator[h5netcdf.File]":
 
     path = dataset_file(path)
     with ExitStack() as stack:
-        with legible(path), bounded(MOST_HELD):
+        with legible(path), bounded(OPENING_BYTES):
             check_alone(path)
             file = stack.enter_context(h5netcdf.File(path, decode_vlen_strings=True))
             attributes = dict(file.attrs)
@@ -134,7 +134,7 @@ def reason(error: Exception) -> str:
     """Return an error as a short line."""
     for_people = isinstance(error, OSError | ValueError | BeyondBound)
     text = str(error) if for_people else f"{type(error).__name__}: {error}"
-    return clipped(" ".join(text.split()), LONGEST_REASON)
+    return clipped(" ".join(text.split()), REASON_CHARACTERS)
 
 
 def without_fields(data: "xarray.DataTree") -> str:
@@ -198,11 +198,11 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
 
     from springtune.problem.parameters import SWEPT
 
-    from .selection import OF_FIELDS, choose, group
+    from .selection import SHOWN_PREFIX, choose, group
 
     fields = group(data, "fields")
     # Of what is swept, fields are of one value each; the values of the scenes are no coordinates of theirs.
-    swept = [name for name in SWEPT if f"{OF_FIELDS}{name}" in fields]
+    swept = [name for name in SWEPT if f"{SHOWN_PREFIX}{name}" in fields]
     asked = {name: labels.pop(name) for name in swept if name in labels}
     fields = fields.drop_vars(swept, errors="ignore")
     meshes = ("beam", "mesh_type", "mesh_size")
@@ -217,12 +217,12 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
     chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
     found = fields.sel(labels | chosen).load()
     for name in swept:
-        kept = found[f"{OF_FIELDS}{name}"]
+        kept = found[f"{SHOWN_PREFIX}{name}"]
         known = np.unique(kept.values[np.isfinite(kept.values)]).tolist()
         if name in asked and known != [asked[name]]:
             listed = ", ".join(map(repr, known)) or "none"
             raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
-        found = found.assign_coords({name: kept}).drop_vars(f"{OF_FIELDS}{name}")
+        found = found.assign_coords({name: kept}).drop_vars(f"{SHOWN_PREFIX}{name}")
     found = network(found)
     found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
     return found

@@ -29,11 +29,11 @@ def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.D
     if name == "/":
         if not data.variables:
             raise ValueError(
-                f"the dataset has no scenes of beams; it has {_listed(f'/{one}' for one in data.children)}"
+                f"the dataset has no scenes of beams; it has {_quoted(f'/{one}' for one in data.children)}"
             )
         return data.to_dataset()
     if name not in data.children:
-        raise ValueError(f"the dataset has no group '/{name}'; it has {_listed(f'/{one}' for one in data.children)}")
+        raise ValueError(f"the dataset has no group '/{name}'; it has {_quoted(f'/{one}' for one in data.children)}")
     return data[name].to_dataset()
 
 
@@ -44,11 +44,11 @@ def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label 
     for name in sorted(chosen, key=lambda name: name not in given):
         found = labels_of(present, name)
         if name in given and chosen[name] not in found:
-            raise ValueError(f"nothing has {name} {chosen[name]!r}; there is {_listed(found)}")
+            raise ValueError(f"nothing has {name} {chosen[name]!r}; there is {_quoted(found)}")
         if not found:
             raise ValueError("nothing to plot: the dataset has no cell of the selection")
         if name not in given and len(found) > 1:
-            raise ValueError(f"choose one {name}: {_listed(found)}")
+            raise ValueError(f"choose one {name}: {_quoted(found)}")
         chosen[name] = chosen[name] if name in given else found[0]
         present = present.sel({name: [chosen[name]]})  # later dimensions are seen under this label
     return chosen
@@ -80,7 +80,7 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
     return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
 
 
-OF_FIELDS = "shown_"
+SHOWN_PREFIX = "shown_"
 """Prefix of variables that hold the swept values of stored fields."""
 
 
@@ -91,10 +91,10 @@ def unswept(root: xr.Dataset) -> xr.Dataset:
 
 def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
     """Swept values of whole fields."""
-    names = [name for name in SWEPT if name in root.dims and f"{OF_FIELDS}{name}" in fields]
+    names = [name for name in SWEPT if name in root.dims and f"{SHOWN_PREFIX}{name}" in fields]
     coordinates = [name for name in root.dims if name in SWEPT]
     # Nothing is kept of what has no value: any will do.
-    values = {name: fields[f"{OF_FIELDS}{name}"].fillna(root[name].values[0]) for name in names}
+    values = {name: fields[f"{SHOWN_PREFIX}{name}"].fillna(root[name].values[0]) for name in names}
     return {name: value.drop_vars(coordinates, errors="ignore") for name, value in values.items()}
 
 
@@ -164,7 +164,7 @@ def listed(
     ]
 
 
-def _listed(labels: Iterable[object]) -> str:
+def _quoted(labels: Iterable[object]) -> str:
     return ", ".join(repr(label) for label in labels) or "nothing"
 
 
@@ -179,13 +179,13 @@ def labelled_beam(data: xr.Dataset, name: str) -> str:
 
 # -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's in its plane ---------
 
-OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE)
+OWN_LAW_REFERENCES = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE)
 """References of own laws, by priority; the last one of materials in plane strain alone."""
 
 
 def own_laws(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
     """References of own laws in a group, and the group without the numbers of those in plane strain of other sheets."""
-    laws = [kind for kind in OWN_LAWS if kind in data.reference.values]
+    laws = [kind for kind in OWN_LAW_REFERENCES if kind in data.reference.values]
     if "material_plane" not in data:
         return [kind for kind in laws if kind != STRAINED_REFERENCE], data
     own = (data.reference != STRAINED_REFERENCE) | (data.material_plane == "strain")

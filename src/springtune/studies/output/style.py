@@ -15,16 +15,16 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 P = ParamSpec("P")
 Drawn = TypeVar("Drawn")
 
-COLUMN = 3.5
+COLUMN_WIDTH = 3.5
 """Width of a column of a journal with two [inch]."""
 
-PAGE = 7.16
+PAGE_WIDTH = 7.16
 """Width of its page [inch]."""
 
-POINTS = 72
+POINTS_PER_INCH = 72
 """Points in an inch, the units of a PDF page."""
 
-SMALL = 7.0
+SMALL_TEXT = 7.0
 """Size of the smallest text of a figure [pt], which journals still take at these widths."""
 
 SETTINGS: dict[Any, object] = {
@@ -42,7 +42,7 @@ SETTINGS: dict[Any, object] = {
     "font.size": 8,
     "grid.color": "0.9",
     "grid.linewidth": 0.5,
-    "legend.fontsize": SMALL,
+    "legend.fontsize": SMALL_TEXT,
     "legend.frameon": False,
     "lines.linewidth": 1.2,
     "lines.markersize": 3.6,
@@ -50,11 +50,11 @@ SETTINGS: dict[Any, object] = {
     "ps.fonttype": 42,
     "savefig.dpi": 300,
     "svg.fonttype": "none",
-    "xtick.labelsize": SMALL,
+    "xtick.labelsize": SMALL_TEXT,
     "xtick.major.size": 2.5,
     "xtick.minor.pad": 4.5,  # texts of both kinds of ticks on one line
     "xtick.minor.size": 1.5,
-    "ytick.labelsize": SMALL,
+    "ytick.labelsize": SMALL_TEXT,
     "ytick.major.size": 2.5,
     "ytick.minor.pad": 4.5,
     "ytick.minor.size": 1.5,
@@ -62,7 +62,7 @@ SETTINGS: dict[Any, object] = {
 
 # Okabe and Ito's colours (https://jfly.uni-koeln.de/color), which the colour-blind tell apart; dashes and markers tell
 # lines apart in grey.
-LINES: tuple[dict[str, Any], ...] = (
+LINE_STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "-", "marker": "o"},
     {"color": "#d55e00", "linestyle": (0, (5, 1.6)), "marker": "s"},
     {"color": "#0072b2", "linestyle": (0, (6, 1.5, 1.2, 1.5)), "marker": "D"},
@@ -83,8 +83,8 @@ SAVED_AS: dict[str, dict[str, Any]] = {
 
 def line(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of the line of that number; beyond the last, colours come back with other markers."""
-    turn, colour = divmod(number, len(LINES))
-    return LINES[(colour + 2 * turn) % len(LINES)] | {"color": LINES[colour]["color"]}
+    turn, colour = divmod(number, len(LINE_STYLES))
+    return LINE_STYLES[(colour + 2 * turn) % len(LINE_STYLES)] | {"color": LINE_STYLES[colour]["color"]}
 
 
 def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
@@ -111,13 +111,13 @@ def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
             interactive = matplotlib.is_interactive()
         matplotlib.interactive(interactive)  # a notebook's backend sets it, when pyplot is imported by a first plot
         for panel in np.ravel(np.asarray(drawn, dtype=object)):
-            _as_written(panel)
+            _show_texts_verbatim(panel)
         return drawn
 
     return inside
 
 
-def _as_written(panel: Axes) -> None:
+def _show_texts_verbatim(panel: Axes) -> None:
     """Take texts as they are: no formulas between $ signs, no ligatures. Powers of ten beside ticks are formulas."""
     legend = panel.get_legend()
     found = [panel.xaxis.label, panel.yaxis.label, *panel.get_children(), *panel.figure.get_children()]

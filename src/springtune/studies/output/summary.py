@@ -12,7 +12,7 @@ from springtune.safe_io.tables import aligned, clock
 from ..runs.plan import Job
 from ..runs.rerun import DATASET, PAGE, PAPER_FILE, SUMMARY
 from ..runs.source import RECORDS, read_note
-from .text import HOLES
+from .text import NOT_ALL_SOLVED
 
 if TYPE_CHECKING:
     from ..config.model import Study
@@ -22,16 +22,16 @@ Jobs = Mapping[str, Job]
 
 def ending(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a successful run."""
-    new, took = _computed(jobs, since), clock(time.time() - since)
-    rows = [["new", new], ["took", took], ["results", _places(_folder(jobs))]]
-    return f"\n{_stored(study, jobs)}\n{aligned(rows, 0)}\n"
+    new, took = _count_new_results(jobs, since), clock(time.time() - since)
+    rows = [["new", new], ["took", took], ["results", _result_paths(_folder(jobs))]]
+    return f"\n{_stored_summary(study, jobs)}\n{aligned(rows, 0)}\n"
 
 
 def broken(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a failed run."""
     lines = [f"{study.name} is not complete: a job failed or was stopped."]
-    for path in _failed(jobs, since):
-        lines += [f"  {_last(path)}", f"    its log: {path}"]
+    for path in _failed_logs(jobs, since):
+        lines += [f"  {_last_line(path)}", f"    its log: {path}"]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
 
@@ -39,12 +39,12 @@ def broken(study: "Study", jobs: Jobs, since: float) -> str:
 def beside(study: "Study", jobs: Jobs, since: float) -> str:
     """Report on a study that the paper needed."""
     undone = [job.name for job in jobs.values() if job.stage and not job.record.exists()]
-    lines = [f"new in {study.name}: {_computed(jobs, since)}"]
+    lines = [f"new in {study.name}: {_count_new_results(jobs, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
-    return "\n".join([*lines, *(f"  its log: {path}" for path in _failed(jobs, since))]) + "\n"
+    return "\n".join([*lines, *(f"  its log: {path}" for path in _failed_logs(jobs, since))]) + "\n"
 
 
-def _last(log: Path) -> str:
+def _last_line(log: Path) -> str:
     """Last line of a job's log."""
     said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
     if said:
@@ -54,11 +54,11 @@ def _last(log: Path) -> str:
     return "it could say nothing: the disk is full; make room" if full else "it said nothing"
 
 
-def _failed(jobs: Jobs, since: float) -> list[Path]:
+def _failed_logs(jobs: Jobs, since: float) -> list[Path]:
     """Logs of jobs that failed or were stopped in this run, which wrote no record in it."""
     logs = sorted((_folder(jobs) / "logs").glob("*.log"))
     records = {path: _folder(jobs) / RECORDS / f"{path.stem}.json" for path in logs}
-    return [path for path, record in records.items() if _time(path) >= since and _time(record) < since]
+    return [path for path, record in records.items() if _modified(path) >= since and _modified(record) < since]
 
 
 def _folder(jobs: Jobs) -> Path:
@@ -71,40 +71,40 @@ def reminder(folder: Path) -> str:
         lines = (folder / SUMMARY).read_text().splitlines()
     except OSError:
         return ""
-    last = [lines[-1], f"{folder / SUMMARY} has the reasons."] if lines[-1].startswith(HOLES) else []
-    return "\n".join([*last, _places(folder)]) + "\n"
+    last = [lines[-1], f"{folder / SUMMARY} has the reasons."] if lines[-1].startswith(NOT_ALL_SOLVED) else []
+    return "\n".join([*last, _result_paths(folder)]) + "\n"
 
 
-def _time(path: Path) -> float:
+def _modified(path: Path) -> float:
     """Modification time; minus infinity if missing."""
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 
-def _stored(study: "Study", jobs: Jobs) -> str:
+def _stored_summary(study: "Study", jobs: Jobs) -> str:
     """Stored summary, if it is up to date."""
     path = _folder(jobs) / SUMMARY
     if not path.exists():
         return f"{study.title}\n\nThere is no dataset yet.\n"
-    if any(job.stage and _time(job.record) > _time(path) for job in jobs.values()):
+    if any(job.stage and _modified(job.record) > _modified(path) for job in jobs.values()):
         return f"{study.title}\n\nThe dataset is older than these results.\n"
     return path.read_text()
 
 
-def _computed(jobs: Jobs, since: float) -> str:
+def _count_new_results(jobs: Jobs, since: float) -> str:
     """Counts of computed and stored results by stage."""
     new, asked = Counter[str](), Counter[str]()
     for job in jobs.values():
         if job.stage and job.record.exists():
             asked[job.stage.name] += len(job.results)
-            new[job.stage.name] += read_note(job.record).get("computed", 0) if _time(job.record) >= since else 0
+            new[job.stage.name] += read_note(job.record).get("computed", 0) if _modified(job.record) >= since else 0
     counts = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if counts:
         return ", ".join(counts) + ("" if new == asked else "; the others were stored before")
-    ran = [job.name for job in jobs.values() if _time(job.record) >= since]
+    ran = [job.name for job in jobs.values() if _modified(job.record) >= since]
     return f"nothing but {', '.join(ran)}" if ran else "nothing: all results were stored before"
 
 
-def _places(folder: Path) -> str:
+def _result_paths(folder: Path) -> str:
     """Existing results, most useful first."""
     files = (PAPER_FILE, PAGE, DATASET, "tables/index.html")
     names = [name for name in files if (folder / name).exists()]

@@ -18,43 +18,47 @@ from springtune.safe_io.tables import aligned
 
 from . import reading
 from .selection import judged, of_own_law
-from .text import HOLES, bytes_text, from_json, paragraphs, place_text, sign_text, without_numbers
+from .text import NOT_ALL_SOLVED, bytes_text, from_json, paragraphs, place_text, sign_text, without_numbers
 
-NAMED = 3
+CELLS_NAMED = 3
 """Cells named for each status; more if fewer than two would remain."""
 
-WORST = 8
+DEFINITIONS_LISTED = 8
 """Most definitions with a worst error."""
 
-SCENES = "/"
+ROOT_GROUP = "/"
 
 
-FINITE = "/finite_strain"
+FINITE_STRAIN_GROUP = "/finite_strain"
 """Group of references for nonlinear kinematics."""
 
 
-REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
+COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "reference_message"}
 """Variables of groups that compare scenes with small-strain references."""
 
 
-def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = WORST) -> str:
+def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
     """Summarise a study's cells, with the errors of at most so many definitions."""
     states = [state for name, data in groups.items() for state in _states(name, data)]
-    rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
+    rows = [[what, str(sum(found.values())), _count_words(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
-    lines += _errors(groups[SCENES], groups.get(FINITE), most) if SCENES in groups else ()
+    lines += _errors(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP), most) if ROOT_GROUP in groups else ()
     for name, data in groups.items():
-        if REFERRED <= set(data):
-            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
+        if COMPARED_VARIABLES <= set(data):
+            lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
     holes = [(what, found, lost) for what, found, lost in states if lost]
     for what, found, lost in holes:
         for status, cells in lost.items():
-            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {sum(found.values())}", *_named(cells)]
+            lines += [
+                "",
+                f"{what}, {_status_words(status)}: {len(cells)} of {sum(found.values())}",
+                *_cell_lines(cells),
+            ]
     if holes:
         told = "; ".join(
             f"{sum(map(len, lost.values()))} of {sum(found.values())} {what}" for what, found, lost in holes
         )
-        lines += ["", f"{HOLES}: {told}. dataset.nc names each, and why: `status`, `message`."]
+        lines += ["", f"{NOT_ALL_SOLVED}: {told}. dataset.nc names each, and why: `status`, `message`."]
     return "\n".join(lines) + "\n"
 
 
@@ -79,25 +83,25 @@ def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, dict[Status, int
             if number and status != Status.SOLVED
         }
         part = label.removesuffix("status").strip("_").replace("_", " ")
-        what = "scenes" if name == SCENES else ", ".join(filter(None, (name.strip("/"), part)))
+        what = "scenes" if name == ROOT_GROUP else ", ".join(filter(None, (name.strip("/"), part)))
         yield what, {status: number for status, number in found.items() if number}, lost
 
 
-def _words(status: Status) -> str:
+def _status_words(status: Status) -> str:
     return str(status).replace("_", " ")
 
 
-def _parts(found: Mapping[Status, int]) -> str:
-    return ", ".join(f"{number} {_words(status)}" for status, number in found.items())
+def _count_words(found: Mapping[Status, int]) -> str:
+    return ", ".join(f"{number} {_status_words(status)}" for status, number in found.items())
 
 
-def _named(cells: Cells) -> Iterator[str]:
+def _cell_lines(cells: Cells) -> Iterator[str]:
     """Some cells, first one for each reason, and the number of others."""
     reasons: dict[str, Cells] = {}
     for cell in cells:
         reasons.setdefault(without_numbers(cell[1]), []).append(cell)
     order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
-    told = order if len(order) <= NAMED + 1 else order[:NAMED]
+    told = order if len(order) <= CELLS_NAMED + 1 else order[:CELLS_NAMED]
     for labels, message in told:
         yield f"  {shown(': '.join(filter(None, (labels, message))))}"
     if len(told) < len(order):
@@ -136,7 +140,7 @@ def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> It
         yield f"  and of {len(found) - most} more at most {100 * found[most][0]:.2f} %"
 
 
-def _unreferenced(root: xr.Dataset, called: str) -> Iterator[str]:
+def _lines_on_references(root: xr.Dataset, called: str) -> Iterator[str]:
     """Missing or inapplicable references with their scenes."""
     requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
     beyond = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
@@ -150,7 +154,7 @@ def _unreferenced(root: xr.Dataset, called: str) -> Iterator[str]:
         few = few.transpose(*root.reference_message.dims)
         messages = root.reference_message.values
         cells = [(place_text(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
-        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
+        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_cell_lines(cells))
 
 
 # -- of a file ---------------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-HOLES = "Not everything is solved"
+NOT_ALL_SOLVED = "Not everything is solved"
 """How the last line of a dataset's summary begins where scenes are not solved."""
 
 

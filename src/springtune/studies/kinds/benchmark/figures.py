@@ -69,7 +69,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     rings = unbeaten(case.assured_error.values, case.seconds.values)
     ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
     lost = "; ".join(filter(None, (ringed, _missing_cases(case) and f"not drawn: {_missing_cases(case)}")))
-    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 4.0))
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 4.0))
     shown = named_approaches(case)
     for ring, approach in zip(rings, map(str, case.approach.values)):
         here = case.sel(approach=approach)

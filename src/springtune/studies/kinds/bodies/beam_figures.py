@@ -90,7 +90,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     curves, root = at(curves, values), at(root.sel(selection), values) if "reference_displacement" in root else None
     # The force has a place of its own.
     words = swept_words({name: value for name, value in values.items() if name != "force" or root is None})
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.6))
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.6))
     unit, written = labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
     known, seen = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit, set()
     for number, size in enumerate(labels_of(curves.status != 0, "mesh_size")):
@@ -161,7 +161,7 @@ def _sensitivity_title(panel, root, selection, swept):
     if root is not None and "beam" in shown:
         shown["beam"] = labelled_beam(root, shown["beam"])
     words = [*title_labels(shown, "beam", "mesh_type", "material", "load"), *swept]
-    first = labels.fitted(panel, [", ".join(words)], 8)
+    first = labels.wrap_to_panel(panel, [", ".join(words)], 8)
     if root is None:
         return first
     force, reference = float(root.force), float(root.reference_displacement)
@@ -270,7 +270,7 @@ def plot_deformed(
         words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
         shown[", ".join(words)] = fields.sel(beam=name).sel(chosen), cut.sel(beam=name)
     extents = [extent(plane(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
-    height = max(float(np.clip((style.PAGE - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
+    height = max(float(np.clip((style.PAGE_WIDTH - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
     title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
     return labels.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
@@ -288,7 +288,7 @@ def _draw_deformed(panel, part):
     scale, flag = magnification(here), int(root.status.sel(mesh_size=here.mesh_size.values))
     draw_network(panel, here, scale)
     text = f"{panel.get_title('left')}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
-    panel.set_title(labels.fitted(panel, [text], 8))
+    panel.set_title(labels.wrap_to_panel(panel, [text], 8))
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
     beyond = [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
@@ -639,7 +639,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     asked = root.status != 0
     load = _pressing_load(labels_of(asked, "load"))
     chosen = choose(asked.sel(load=[load]), beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
-    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 3.0))
+    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE_WIDTH, 3.0))
     size = 1e3 * chosen["mesh_size"]
     here = root.sel(chosen)
     values = last_swept(here.status != 0)

@@ -17,7 +17,7 @@ from springtune.springs.lattice import predicted_stiffness
 
 from ...config.model import Reference, keeps_fields
 from ...output.dataset import NO_NODE
-from ...output.selection import OF_FIELDS
+from ...output.selection import SHOWN_PREFIX
 from ...runs import store
 from . import any_reference, plan, stored, variables
 from .outputs import CASE_AXES, MESH_AXES, SHAPES_OUTPUT, pressed
@@ -285,7 +285,7 @@ def _rest_rows(study, folder):
     compared = set()  # scenes differ in their definitions
     for scene in shown:
         labels = study.labels(scene)
-        yield labels | {f"{OF_FIELDS}{name}": labels[name] for name in study.swept}
+        yield labels | {f"{SHOWN_PREFIX}{name}": labels[name] for name in study.swept}
         one = Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
         if (scene.mesh, one) in compared:
             continue

@@ -79,7 +79,7 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     points = {name: {one: _points_of_line(cut, name, one) for one in definitions} for name in names}
     if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
-    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows))
+    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE_WIDTH, 0.35 + tall * rows))
     labels.entitle(figure, title)
     for panels, name in zip(axes, names):
         _draw_errors(panels, cut, name, points[name])
@@ -159,7 +159,7 @@ def _draw_errors(panels, cut, name, points):
     panels[0].set_title(f"{name}: {described(cut, name)}")
     said = [f"{difference:.2g} % from expected"] if difference > 0 else []
     said += [f"known to {estimate:.1g} %"] if estimate > 0 else []
-    panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL)
+    panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL_TEXT)
 
 
 def _reason_without_error(cut):
@@ -209,7 +209,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     texts = [[drawing.NOT_ASKED if name not in row else
               drawing.error_text(row[name], "") if np.isfinite(row[name]) else drawing.NO_RESULT
               for name in names] for row in rows.values()]  # fmt: skip
-    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 1.4 + 0.17 * max(len(rows), 3)))
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
     if not np.isfinite(errors).any():
         labels.say(panel, "No quantity has an error: see status and message.")
@@ -301,7 +301,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     places = np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")])
     width, height = drawing.extent(places, (1.0, 1.0))
     columns = min(NETWORKS_IN_ROW, len(wanted))
-    wide = (style.COLUMN if columns == 1 else style.PAGE) / columns - 0.5
+    wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
     tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
     networks = case.reindex(definition=wanted)
     scale, most = drawing.magnification(networks), _largest_force(networks)

@@ -9,8 +9,8 @@ import numpy as np
 
 from springtune.problem.parameters import OF_BODIES, SWEPT
 
-from ...output.dataset import NO_NODE, OF_PARTICLES, OF_SPRINGS, UGRID, Group
-from ...output.selection import OF_FIELDS
+from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SPRING_ATTRIBUTES, UGRID, Group
+from ...output.selection import SHOWN_PREFIX
 from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES
 
 if TYPE_CHECKING:
@@ -44,7 +44,9 @@ def declared(group: str, **options: Any) -> Group:
 
 YES_OR_NO = {"applies": ("no", "yes")}
 MESH_ATTRIBUTES = (
-    UGRID | dict.fromkeys(("displacement_x", "displacement_y"), OF_PARTICLES) | {"spring_force": OF_SPRINGS}
+    UGRID
+    | dict.fromkeys(("displacement_x", "displacement_y"), PARTICLE_ATTRIBUTES)
+    | {"spring_force": SPRING_ATTRIBUTES}
 )
 KIND_OF_REFERENCE = {"reference": "kind of reference"}
 
@@ -55,8 +57,8 @@ BLOCK = declared("/block", dimensions=KIND_OF_REFERENCE | {"face_position": "pla
 FIELDS = declared(
     "/fields",
     further=MESH_ATTRIBUTES
-    | dict.fromkeys(("particle_reference_x", "particle_reference_y"), OF_PARTICLES)
-    | {"stiffness": OF_SPRINGS},
+    | dict.fromkeys(("particle_reference_x", "particle_reference_y"), PARTICLE_ATTRIBUTES)
+    | {"stiffness": SPRING_ATTRIBUTES},
 )
 """Whole fields of the coarsest mesh of each beam and mesh type.
 
@@ -107,7 +109,7 @@ def fields_of(study: "Study") -> Group:
     """Group of whole fields, which are stored for one value of each swept parameter: the group says which."""
     place = "beam", "mesh_type", "material", "load"
     swept = {
-        f"{OF_FIELDS}{name}": (place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan)
+        f"{SHOWN_PREFIX}{name}": (place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan)
         for name in study.swept
     }
     return replace(FIELDS, variables=FIELDS.variables | swept)

@@ -69,7 +69,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     ('sheet', 'Time for 1/60 s of motion [ms]')
     """
     case, runs, lost = _runs(data, "engines", scene)
-    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 3.8))
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 3.8))
     there = False
     for number, (name, rows) in enumerate(runs.items()):
         errors = 100 * rows.error.abs().where(rows.error != 0).values

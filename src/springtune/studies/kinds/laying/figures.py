@@ -54,7 +54,7 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
             laid = laid.sel({name: [label]})
     shown = cells(laid.status != 0, ("loading", "friction"))
     names = labels_of(laid.status != 0, "definition")
-    size = (style.PAGE, (1.05 + 0.16 * max(len(names), 4)) * len(shown))
+    size = (style.PAGE_WIDTH, (1.05 + 0.16 * max(len(names), 4)) * len(shown))
     _, axes = style.panels(ax, len(shown), 3, figsize=size, width_ratios=[1.9, 1.0, 1.0])
     for row, cell in zip(axes, shown):
         _draw_row(row, laid.sel(cell), cell, names)
@@ -123,7 +123,7 @@ def _draw_dots(panel, laid, names, variable):
         if not len(solved):
             said = ", ".join(labels.statuses(strips.status.values)) or "not requested"
             panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
-                       fontsize=style.SMALL, color="0.25")  # fmt: skip
+                       fontsize=style.SMALL_TEXT, color="0.25")  # fmt: skip
     panel.set_yticks(range(len(names)), map(no_mathematics, names))
     panel.set_ylim(len(names) - 0.4, -0.6)
     panel.margins(x=0.12)

@@ -141,7 +141,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
             texts[row, column] = error_text(error[row, column]) + "*" * bool(doubted[column])
         heat_map(panel, error, texts)
         panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
-        panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
+        panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL_TEXT)
         panel.set_yticks(range(len(names)), map(no_mathematics, names))
         return [], ""
 

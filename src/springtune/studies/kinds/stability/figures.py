@@ -138,7 +138,7 @@ def plot_stability_strains(data, ax=None):
         panel.pcolormesh(flags, cmap=ListedColormap(STATUS_COLOURS), vmin=-0.5, vmax=5.5, edgecolor="white")
         for (i, j), flag in np.ndenumerate(flags):
             written, colour = text(flag, *(one[i, j] for one in others)), "white" if flag in (3, 5) else "black"
-            panel.text(j + 0.5, i + 0.5, written, ha="center", va="center", fontsize=style.SMALL, color=colour)
+            panel.text(j + 0.5, i + 0.5, written, ha="center", va="center", fontsize=style.SMALL_TEXT, color=colour)
         panel.set_xticks(np.arange(len(strains)) + 0.5, strains)
         panel.set_yticks(np.arange(len(names)) + 0.5, map(no_mathematics, names))
         panel.set(xlabel="Strain of a linear sheet under the load [%]")

@@ -31,10 +31,10 @@ from .. import reading
 from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
 from . import View
 
-SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
+PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
 
-LIBRARY = ("bokeh", "bokeh-api")
+BOKEH_SCRIPTS = ("bokeh", "bokeh-api")
 """Scripts of BokehJS that the page needs."""
 
 
@@ -53,7 +53,7 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     content = {"groups": groups, "declared": declared, "files": sorted(files), "scale": scale}
     library = _library()
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
-    script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in SCRIPTS) + "})();\n"
+    script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in PAGE_SCRIPTS) + "})();\n"
     # Scripts run only with one of these hashes, and nothing may be loaded: a script in a title stays a text.
     hashes = " ".join(_hash(text) for text in (script, *library.values()))
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
@@ -65,7 +65,7 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
         policy=f"{policy}; form-action 'none'",
         style=Markup(_asset("style.css")),
         script=Markup(script),
-        blocks={name: _deflated(text.encode()) for name, text in texts.items()},
+        blocks={name: _compress(text.encode()) for name, text in texts.items()},
     )
 
 
@@ -73,7 +73,7 @@ def _asset(name: str) -> str:
     return (Path(__file__).parent / "assets" / name).read_text(encoding="utf-8")
 
 
-def _deflated(content: bytes) -> str:
+def _compress(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content, 9)).decode()
 
 
@@ -83,7 +83,7 @@ def _library() -> dict[str, str]:
     if found is None or found.origin is None:
         raise FileNotFoundError("the package bokeh is not installed; `pip install bokeh` or `make study` installs it")
     folder = Path(found.origin).parent / "server/static/js"
-    return {name: (folder / f"{name}.min.js").read_text(encoding="utf-8") for name in LIBRARY}
+    return {name: (folder / f"{name}.min.js").read_text(encoding="utf-8") for name in BOKEH_SCRIPTS}
 
 
 def _hash(script: str) -> str:
@@ -95,20 +95,20 @@ def _hash(script: str) -> str:
 LONG_DIMENSION = 16
 """Fewest labels of a last dimension that counts as points along a line."""
 
-CLEARED_OF_CELLS, CLEARED_OF_LINES = 6, 9
+CELL_BITS_CLEARED, LINE_BITS_CLEARED = 6, 9
 """Cleared bits of 23: 5 digits of a number are left, and 4 of a point on a line, finer than a pixel."""
 
-ABSENT = -1
+EMPTY_TEXT = -1
 """Number of an empty text."""
 
-ROOM = 4_200_000
+MOST_CHARACTERS = 4_200_000
 """Most characters of all numbers: the page with its library stays below 5 MB."""
 
 
-def packed(file: h5netcdf.File, room: int = ROOM) -> list[dict[str, Any]]:
+def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
     """Describe and pack the groups of a dataset; of a large one the largest variables are left out, and named."""
     children = [group for group in file.groups.values() if group.variables]
-    groups = [_described(group, group.variables, file.variables) for group in (file, *children)]
+    groups = [_describe(group, group.variables, file.variables) for group in (file, *children)]
     rows = [(group, row) for group in groups for row in group["variables"]]
     excess = sum(len(row["data"]) for _, row in rows) - room
     # Cells last: without them there is no table.
@@ -123,7 +123,7 @@ def packed(file: h5netcdf.File, room: int = ROOM) -> list[dict[str, Any]]:
 Variables = Mapping[str, h5netcdf.Variable]
 
 
-def _described(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[str, Any]:
+def _describe(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[str, Any]:
     """Describe and pack a group: its `own` variables, with labels that it may share with the `root`."""
     rows: list[dict[str, Any]] = []
     sizes: dict[str, int] = {}
@@ -138,21 +138,21 @@ def _described(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[s
             row["flags"] = dict(zip(map(str, flags), meanings))
         values = _values(stored)  # each read, packed and forgotten
         if name == "status":
-            values = _judged(own, row, values)
+            values = _mark_beyond_linear(own, row, values)
         elif ERROR.search(name) and row.get("units", "1") == "1":
             row["error"] = True
-            if _signed(row, values):
-                row |= {"signed": True, "sign": _sign(name, own, root)}
-        rows.append(row | _variable(values))
+            if _has_sign(row, values):
+                row |= {"signed": True, "sign": _sign_sentence(name, own, root)}
+        rows.append(row | _pack_values(values))
     dims = [{"name": name, "size": size} | _labels(name, own, root) for name, size in sizes.items()]
-    attributes = {name: _plain(value) for name, value in group.attrs.items() if name != "coordinates"}
+    attributes = {name: _json_value(value) for name, value in group.attrs.items() if name != "coordinates"}
     return {"path": group.name, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
 
 
 def _labels(name: str, own: Variables, root: Variables) -> dict[str, Any]:
     """Labels of a dimension, if it has any, and words on it."""
     stored = own.get(name) or root.get(name)
-    return {"labels": list(map(_plain, stored[...].tolist()))} | _words_on(stored) if stored else {}
+    return {"labels": list(map(_json_value, stored[...].tolist()))} | _words_on(stored) if stored else {}
 
 
 def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
@@ -166,7 +166,7 @@ def _values(stored: h5netcdf.Variable) -> np.ndarray:
     return np.where(values == fill, np.nan, values) if fill is not None and values.dtype.kind in "iu" else values
 
 
-def _spread(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
+def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
     """Values of an array whose axes are those of `dims`, of one place where it has none."""
     values = stored[...].transpose([stored.dimensions.index(name) for name in dims if name in stored.dimensions])
     return values[tuple(slice(None) if name in stored.dimensions else None for name in dims)]
@@ -185,27 +185,27 @@ REFERENCES = {
 """What an error is against, where that is no `reference_displacement`."""
 
 
-def _judged(own: Variables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
+def _mark_beyond_linear(own: Variables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
     """Statuses, of which solved cells that the linear reference cannot judge get one of their own."""
     flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
     applies = own.get("reference_applies")
     if "solved" not in flags or applies is None or not set(applies.dimensions) <= set(row["dims"]):
         return status
     beyond = max(flags.values()) + 1
-    found = np.where((status == flags["solved"]) & (_spread(applies, row["dims"]) == 0), beyond, status)
+    found = np.where((status == flags["solved"]) & (_broadcast(applies, row["dims"]) == 0), beyond, status)
     if (found == beyond).any():
         row["flags"][str(beyond)] = "beyond_linear"
     return found
 
 
-def _signed(row: dict[str, Any], values: np.ndarray) -> bool:
+def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
     """Whether the sign of an error means something: not that of a norm, or of a number printed without one."""
     said = row.get("long_name", "")
     stated = re.search(r"signed|less 1|- 1$|network - reference", said)
     return "without sign" not in said and bool(stated or (values < 0).any())
 
 
-def _sign(name: str, own: Variables, root: Variables) -> str:
+def _sign_sentence(name: str, own: Variables, root: Variables) -> str:
     """Which sign of a group's errors means too soft, by their references."""
     reference = REFERENCES.get(name, "reference_displacement")
     reference = reference if reference in own else "reference_displacement"
@@ -215,7 +215,7 @@ def _sign(name: str, own: Variables, root: Variables) -> str:
     dims, others = group[reference].dimensions, False
     values = group[reference][...]
     if "quantity_kind" in group:
-        displacements = _spread(group["quantity_kind"], dims) == "displacement"
+        displacements = _broadcast(group["quantity_kind"], dims) == "displacement"
         others = bool((np.isfinite(values) & ~displacements).any())
         values = np.where(displacements, values, np.nan)
     axes = {one: _labels(one, own, root).get("labels", ()) for one in dims}
@@ -228,10 +228,10 @@ def _sign(name: str, own: Variables, root: Variables) -> str:
 # -- arrays ------------------------------------------------------------------------------------------------------------
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     """A label or an attribute for JSON, which has no NaN."""
     if isinstance(value, np.ndarray):
-        return [_plain(one) for one in value.tolist()]
+        return [_json_value(one) for one in value.tolist()]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not np.isfinite(value):
@@ -239,22 +239,22 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, bool | int | float | str) else str(value)
 
 
-def _variable(values: np.ndarray) -> dict[str, Any]:
+def _pack_values(values: np.ndarray) -> dict[str, Any]:
     if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
         with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
             numbers = values.real.astype(np.float32)
-        return _rows({"type": "float"}, numbers, ~np.isnan(numbers))
+        return _pack({"type": "float"}, numbers, ~np.isnan(numbers))
     if values.dtype.kind in "iub":
-        return _rows({"type": "integer"}, values.astype(np.int32), values != 0)
+        return _pack({"type": "integer"}, values.astype(np.int32), values != 0)
     # No array of texts, which gives each the room of the longest one.
     texts = list(map(str, (values if values.dtype.kind == "O" else values.astype(str)).ravel().tolist()))
     words = sorted(set(texts))
-    numbers_of = {word: number if word else ABSENT for number, word in enumerate(words)}
+    numbers_of = {word: number if word else EMPTY_TEXT for number, word in enumerate(words)}
     places = np.fromiter(map(numbers_of.__getitem__, texts), np.int32, len(texts)).reshape(values.shape)
-    return _rows({"type": "text", "words": words}, places, places != ABSENT)
+    return _pack({"type": "text", "words": words}, places, places != EMPTY_TEXT)
 
 
-def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
+def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
     """Pack an array: its bytes, and how to read them."""
     long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
     points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
@@ -267,7 +267,7 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[
         parts.append(np.packbits(kept, bitorder="little").tobytes())
         numbers = numbers[kept]
     if row["type"] == "float":
-        row["cleared"] = CLEARED_OF_LINES if points > 1 else CLEARED_OF_CELLS
+        row["cleared"] = LINE_BITS_CLEARED if points > 1 else CELL_BITS_CLEARED
         numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)  # all NaN are equal
         bits = numbers.view(np.int32).copy()
         bits[np.isfinite(numbers)] += 1 << (row["cleared"] - 1)
@@ -279,7 +279,7 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[
         bits = np.diff(bits, axis=1, prepend=np.int32(0))
     folded = (bits << 1) ^ (bits >> 31)
     parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
-    return row | {"data": _deflated(b"".join(parts))}
+    return row | {"data": _compress(b"".join(parts))}
 
 
 def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
