@@ -10,12 +10,12 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.units import QUANTITY_KINDS, UnitError, parse
+from springtune.units import QUANTITY_DIMENSIONS, UnitError, parse
 
 REGISTRY = pint.UnitRegistry()
 
 QUANTITIES = yaml.safe_load(Path(__file__).with_name("units.yaml").read_text())
-USUAL = [(kind, unit) for kind, one in QUANTITY_KINDS.items() for unit in one.units]
+USUAL = [(kind, unit) for kind, one in QUANTITY_DIMENSIONS.items() for unit in one.units]
 
 
 @pytest.mark.parametrize(("text", "kind", "value"), QUANTITIES["read"])
@@ -25,13 +25,13 @@ def test_reads_quantities(text, kind, value):
 
 @pytest.mark.parametrize(("kind", "unit"), USUAL)
 def test_table_agrees_with_pint(kind, unit):
-    theirs = REGISTRY.Quantity(1.0, unit).to(QUANTITY_KINDS[kind].unit).magnitude
+    theirs = REGISTRY.Quantity(1.0, unit).to(QUANTITY_DIMENSIONS[kind].unit).magnitude
     assert math.isclose(parse(f"1 {unit}", kind), theirs, rel_tol=1e-9)
 
 
-@pytest.mark.parametrize("kind", QUANTITY_KINDS)
+@pytest.mark.parametrize("kind", QUANTITY_DIMENSIONS)
 def test_examples_in_messages_are_right(kind):
-    assert parse(QUANTITY_KINDS[kind].example, kind) > 0
+    assert parse(QUANTITY_DIMENSIONS[kind].example, kind) > 0
 
 
 @pytest.mark.parametrize(("text", "kind", "says"), QUANTITIES["refused"])
@@ -39,7 +39,7 @@ def test_refuses(text, kind, says):
     with pytest.raises(UnitError) as caught:
         parse(text, kind)
     assert says in str(caught.value)
-    assert QUANTITY_KINDS[kind].example in str(caught.value)
+    assert QUANTITY_DIMENSIONS[kind].example in str(caught.value)
 
 
 @given(
@@ -48,10 +48,10 @@ def test_refuses(text, kind, says):
 )
 def test_value_is_the_nearest_float(kind_and_unit, number):
     kind, unit = kind_and_unit
-    assert parse(f"{number} {unit}", kind) == float(number * Decimal(QUANTITY_KINDS[kind].units[unit]))
+    assert parse(f"{number} {unit}", kind) == float(number * Decimal(QUANTITY_DIMENSIONS[kind].units[unit]))
 
 
-@given(st.text(max_size=20), st.sampled_from(sorted(QUANTITY_KINDS)))
+@given(st.text(max_size=20), st.sampled_from(sorted(QUANTITY_DIMENSIONS)))
 def test_any_text_is_read_or_refused(text, kind):
     try:
         assert math.isfinite(parse(text, kind))

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
-    """Kind of a quantity, with its usual units and their size in its SI unit.
+class Dimension:
+    """Dimension of a quantity, with its usual units and their size in its SI unit.
 
     Examples
     --------
-    >>> QUANTITY_KINDS["stress"].unit
+    >>> QUANTITY_DIMENSIONS["stress"].unit
     'Pa'
     """
 
@@ -40,27 +40,33 @@ class Kind:
 DEGREE = "0.01745329251994329576923690768488612713"
 """A degree [rad]."""
 
-QUANTITY_KINDS = {
-    kind.name: kind
-    for kind in (
-        Kind("length", "m", "200 mm", {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "km": "1e3"}),
-        Kind("force", "N", "400 kN", {"N": "1", "mN": "1e-3", "kN": "1e3", "MN": "1e6"}),
-        Kind(
+QUANTITY_DIMENSIONS = {
+    dimension.name: dimension
+    for dimension in (
+        Dimension("length", "m", "200 mm", {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "km": "1e3"}),
+        Dimension("force", "N", "400 kN", {"N": "1", "mN": "1e-3", "kN": "1e3", "MN": "1e6"}),
+        Dimension(
             "stiffness", "N/m", "170e6 N/m", {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6"}
         ),
-        Kind("stress", "Pa", "210 GPa", {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/mm^2": "1e6"}),
-        Kind("density", "kg/m^3", "7850 kg/m^3", {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"}),
-        Kind("area", "m^2", "12 mm^2", {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"}),
-        Kind("energy", "J", "3.5 J", {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"}),
-        Kind("acceleration", "m/s^2", "9.81 m/s^2", {"m/s^2": "1", "mm/s^2": "1e-3"}),
-        Kind("angle", "rad", "30 deg", {"rad": "1", "deg": DEGREE, "mrad": "1e-3"}),
-        Kind("time", "s", "5 ms", {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60"}),
-        Kind("frequency", "Hz", "10 Hz", {"Hz": "1", "mHz": "1e-3", "kHz": "1e3"}),
+        Dimension("stress", "Pa", "210 GPa", {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/mm^2": "1e6"}),
+        Dimension(
+            "density", "kg/m^3", "7850 kg/m^3", {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"}
+        ),
+        Dimension("area", "m^2", "12 mm^2", {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"}),
+        Dimension("energy", "J", "3.5 J", {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"}),
+        Dimension("acceleration", "m/s^2", "9.81 m/s^2", {"m/s^2": "1", "mm/s^2": "1e-3"}),
+        Dimension("angle", "rad", "30 deg", {"rad": "1", "deg": DEGREE, "mrad": "1e-3"}),
+        Dimension("time", "s", "5 ms", {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60"}),
+        Dimension("frequency", "Hz", "10 Hz", {"Hz": "1", "mHz": "1e-3", "kHz": "1e3"}),
     )
 }
-"""Kinds of quantity by name."""
+"""Dimensions of quantities by name."""
 
-_KNOWN = {unit: (kind.name, Decimal(size)) for kind in QUANTITY_KINDS.values() for unit, size in kind.units.items()}
+_KNOWN = {
+    unit: (dimension.name, Decimal(size))
+    for dimension in QUANTITY_DIMENSIONS.values()
+    for unit, size in dimension.units.items()
+}
 
 _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?:/([0-9]+))?\s*(.*)", re.DOTALL)
 
@@ -76,7 +82,7 @@ _OTHER_NUMBER = re.compile(r"\^|(?<![\w.])(?!1(?![\w.]))[\d.]")
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity of the wanted kind; the message says why and what to write instead.
+    """A text that is not a quantity of the wanted dimension; the message says why and what to write instead.
 
     Public functions raise it as a plain ValueError that names the argument.
 
@@ -92,9 +98,9 @@ class UnitError(ValueError):
     """
 
 
-def parse(text: str, kind: str) -> float:
+def parse(text: str, dimension: str) -> float:
     """Return the number in SI units of a quantity; its number may be a fraction, such as 1/60."""
-    wanted = QUANTITY_KINDS[kind]
+    wanted = QUANTITY_DIMENSIONS[dimension]
     if len(text) > LONGEST_QUANTITY:
         text = f"{text[:57]}..."
         raise UnitError(f"'{text}' is too long; give {wanted.words}")
@@ -114,9 +120,9 @@ def parse(text: str, kind: str) -> float:
         near = same or get_close_matches(unit, wanted.units, n=1, cutoff=0.5)
         meant = f", did you mean '{near[0]}'?" if near else ";"
         raise UnitError(f"'{text}': unknown unit '{unit}'{meant} {remedy}")
-    is_kind, size = known
-    if is_kind != kind:
-        raise UnitError(f"'{text}' is {_article(is_kind)}; {remedy}")
+    found_dimension, size = known
+    if found_dimension != dimension:
+        raise UnitError(f"'{text}' is {_article(found_dimension)}; {remedy}")
     try:
         value = float(Decimal(number) * size / int(below or 1))
     except ArithmeticError:
@@ -133,9 +139,9 @@ def _spelling(unit: str) -> str:
     )
 
 
-def _article(kind: str) -> str:
-    article = "an" if kind[0] in "aeiou" else "a"
-    return f"{article} {kind}" if kind in QUANTITY_KINDS else kind
+def _article(dimension: str) -> str:
+    article = "an" if dimension[0] in "aeiou" else "a"
+    return f"{article} {dimension}" if dimension in QUANTITY_DIMENSIONS else dimension
 
 
 @cache
@@ -162,9 +168,9 @@ def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
         return None
     if of_print := _OF_PRINT.search(str(given)):  # to pint lengths, or numbers of dots
         return f"a number of {of_print[0]}s, which have no size of their own", Decimal(1)
-    for kind in QUANTITY_KINDS.values():
-        if kind.name in ("angle", "frequency"):
+    for dimension in QUANTITY_DIMENSIONS.values():
+        if dimension.name in ("angle", "frequency"):
             continue  # to pint an angle is a number, as a percentage is, and a speed of rotation a frequency
-        if given.dimensionality == registry.parse_units(kind.unit).dimensionality:
-            return kind.name, Decimal(f"{size:.15g}")
+        if given.dimensionality == registry.parse_units(dimension.unit).dimensionality:
+            return dimension.name, Decimal(f"{size:.15g}")
     return f"of dimension {given.dimensionality}", Decimal(1)

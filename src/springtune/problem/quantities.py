@@ -53,9 +53,9 @@ def beyond(number: float, kind: str) -> bool:
 
 
 def _remedy(kind: str) -> str:
-    from ..units import QUANTITY_KINDS
+    from ..units import QUANTITY_DIMENSIONS
 
-    return f"give {QUANTITY_KINDS[kind].words}, or a number in {QUANTITY_KINDS[kind].unit}"
+    return f"give {QUANTITY_DIMENSIONS[kind].words}, or a number in {QUANTITY_DIMENSIONS[kind].unit}"
 
 
 LONGEST_WORD = 100

@@ -68,30 +68,30 @@ class Section(BaseModel):
 # -- single values -----------------------------------------------------------------------------------------------------
 
 
-def read_quantity(value: object, kind: str, signed: bool = False) -> float:
+def read_quantity(value: object, dimension: str, signed: bool = False) -> float:
     """Return a quantity in SI units, above zero unless `signed`."""
-    about = units.QUANTITY_KINDS[kind]
+    about = units.QUANTITY_DIMENSIONS[dimension]
     if not isinstance(value, str):
         raise refuse(f"{show(value)} instead of {about.words}; give {about.words}")
     if signed and value.strip() in ("0", "0.0", "-0"):  # which needs no unit
         return 0.0
     try:
-        number = units.parse(value, kind)
+        number = units.parse(value, dimension)
     except units.UnitError as error:
         raise refuse(str(error)) from None
     if not number > 0 and not signed:
         raise refuse(f"{show(value)} is not above zero; give a size above zero, such as '{about.example}'")
-    if not abs(number) < LARGEST_QUANTITY if signed else beyond(number, kind):
+    if not abs(number) < LARGEST_QUANTITY if signed else beyond(number, dimension):
         raise refuse(f"{show(value)} is beyond all measure; give {about.words}")
     return number + 0.0
 
 
-def quantity(kind: str, signed: bool = False) -> Notes:
-    """Notes of a quantity, a key of `springtune.units.QUANTITY_KINDS`; above zero unless `signed`."""
-    about = units.QUANTITY_KINDS[kind]
+def quantity(dimension: str, signed: bool = False) -> Notes:
+    """Notes of a quantity, a key of `springtune.units.QUANTITY_DIMENSIONS`; above zero unless `signed`."""
+    about = units.QUANTITY_DIMENSIONS[dimension]
     pattern = r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
     form = {"type": ["string", "number"]} if signed else {"type": "string", "pattern": pattern}
-    read = BeforeValidator(partial(read_quantity, kind=kind, signed=signed))
+    read = BeforeValidator(partial(read_quantity, dimension=dimension, signed=signed))
     return read, WithJsonSchema(form | {"examples": [about.example]}), Field(title=about.words)
 
 

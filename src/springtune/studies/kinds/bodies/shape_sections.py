@@ -23,7 +23,7 @@ QUANTITIES = {
 
 def pair_field(kind: str) -> Any:
     """Field of two quantities, along x and along y."""
-    example = units.QUANTITY_KINDS[kind].example
+    example = units.QUANTITY_DIMENSIONS[kind].example
     pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
     return Field(title=f"{kind}s along x and y, such as [{pair}]")
 
