@@ -1,4 +1,4 @@
-"""What holds for the whole source: imports, stages of study kinds, and what tests may touch."""
+"""Imports of the whole source: their contracts, and what is light to import."""
 
 import ast
 import subprocess
@@ -35,8 +35,3 @@ def test_what_is_used_alone_does_not_import_what_is_heavy(program, heavy):
     program = f"import sys; {program}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
     assert not set(heavy.split()) & set(done.stdout.splitlines()[-1].split())
-
-
-OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
-OWN |= {"KIND", "OUTPUTS", "PAGE", "STAGE", "STAGES", "VIEWS"}
-"""Constants that say the same of each solver or each study kind, and that each has its own value of."""
