@@ -1,14 +1,9 @@
 """MuJoCo: springs as tendons, triangles of a material as a flex; one engine for each integrator.
 
-The model is that of `springtune.handover.mujoco`, with the step and the integrator of a setting. `Euler` and
-`implicitfast` are implicit in dampers alone: as with `RK4`, springs need steps below the stable one. `discrete`,
-since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `iterations` are those of its conjugate
-gradients, of which MuJoCo allows 100 by default; they stop at a ten-thousandth of the load. The others do
-not iterate without contacts. MuJoCo computes in double precision.
-
-Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` in joints and tendons,
-which `RK4` takes explicitly, `Euler` those of tendons, and the others implicitly. A state that diverges is put back to
-the beginning by default; that is turned off here, so that it is seen.
+`Euler`, `implicitfast` and `RK4` need steps below the stable one. `discrete`, since MuJoCo 3.13, is implicit in
+springs, too, by one linear system a step: `iterations` are those of its conjugate gradients, by default 100. The others
+do not iterate without contacts. MuJoCo computes in double precision. Velocities are scaled after each step, so joints
+have no damping. A state that diverges is put back to the beginning by default; that is turned off here.
 """
 
 from collections.abc import Iterator

@@ -1,28 +1,18 @@
 """Newton (newton-physics) on the processor: springs, and triangles of a material, in its solvers VBD and XPBD.
 
-All formulas are from the kernels of Newton 1.8. mu and lambda are Lame's constants of plane stress, h is the thickness.
+Formulas are from the kernels of Newton 1.8; mu and lambda are Lame's constants of plane stress, h is the thickness.
+XPBD corrects all springs at once and diverges above the largest step of explicit schemes, at any number of iterations.
+It has no triangles, and ignores springs of negative stiffness. Triangles of VBD have the law
 
-Springs follow Hooke's law. XPBD corrects all springs at once, so that it diverges above the largest step of explicit
-schemes, at any number of iterations; it resets its multipliers in each step. It has no triangles, and ignores springs
-of negative stiffness.
+    W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2],  tri_ke = mu h,  tri_ka = lambda h.
 
-Triangles of VBD have the law
+At a strain e, displacements differ by some 2 e from those by St. Venant-Kirchhoff's law, which `delingette` has.
 
-    W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
-
-with ``tri_ke = mu h`` and ``tri_ka = lambda h``. At small strain it is Hooke's law. At a strain e, displacements differ
-by some 2 e from those by St. Venant-Kirchhoff's law, which `delingette` has, and by less than e from those of small
-strain.
-
-What is set besides, because Newton's defaults differ: gravity 0 and no ground; radius of particles 0, so that they do
-not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s). VBD has the colours of
-`ModelBuilder.color`, as other scripts do, and its own by springs, which that does not see.
-
-Positions are of single precision, and absolute: what a step moves below the last place of a position is lost. So nets
-are centred at zero, which leaves XPBD's and VBD's slender bending 2e-4 off in place of 6e-3. Do the same in Newton.
-
-Newton holds particles as a whole. A direction held singly is put back after each step. The force that would have kept
-it there is added to the next step: at rest it is the support's reaction.
+Newton's defaults differ in gravity, ground, radius of particles, damping (``tri_kd`` is 10) and the limit of
+velocities. VBD has the colours of `ModelBuilder.color`, which does not see springs; for these it gets our own.
+Positions are absolute and of single precision, so nets are centred at zero: VBD's slender bending is 2e-4 off then,
+else 6e-3. Newton holds particles as a whole: a direction held singly is put back after each step, and the force that
+would have kept it there is added to the next step.
 """
 
 from collections.abc import Iterator

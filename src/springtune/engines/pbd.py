@@ -1,21 +1,14 @@
 """Position-based dynamics: Mueller, Heidelberger, Hennix and Ratcliff, J. Vis. Commun. Image R. 18, 2007.
 
-A warning rather than a tool: its stiffness s is no stiffness, but the share of a spring's stretch that an iteration
-takes away, between 0 and 1. One spring that holds a force, with w the sum of its ends' inverse masses, n iterations and
-steps of h, rests as if it had
+A warning rather than a tool: its stiffness s is the share of a spring's stretch that an iteration takes away, between 0
+and 1. One spring that holds a force, with w the sum of its ends' inverse masses, n iterations and steps of h, rests as
+if it had
 
-    k = ((1 - s)^-n - 1) / (w h^2)    [N/m].
+    k = ((1 - s)^-n - 1) / (w h^2)    [N/m], so    s = 1 - (1 + k w h^2)^(-1/n),
 
-The same s is stiffer with more iterations, with shorter steps and with lighter particles. With any s above 0, springs
-tend to rods as n grows or h shrinks. So s must follow the setting, one for each spring:
-
-    s = 1 - (1 + k w h^2)^(-1/n).
-
-With one iteration that is the first iteration of XPBD. A net of springs then tends to our equilibrium as h shrinks:
-the error falls as h^2, at any n. It does not as n grows, since iterations know of no load. They tend to the flow of x
-along ``-M^-1 dV/dx`` for a unit of time, V the energy of springs of ``ln(1 + k w h^2) / w`` in the place of k. Linear,
-with A = M^-1 times the tangent of V, the net rests where ``(exp(A) - 1) u = h^2 M^-1 f``; ``A u = h^2 M^-1 f`` would be
-our equilibrium at small h.
+which is another s for each setting and spring. A net of springs then tends to our equilibrium as h shrinks: the error
+falls as h^2, at any n. It does not as n grows, since iterations know of no load: with A = M^-1 times the tangent of
+springs of ``ln(1 + k w h^2) / w``, a linear net rests where ``(exp(A) - 1) u = h^2 M^-1 f``.
 """
 
 import numpy as np

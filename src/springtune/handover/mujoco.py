@@ -1,19 +1,16 @@
 """MuJoCo's models (MJCF): particles on slides, springs as tendons.
 
 Each particle that can move is a body on a slide joint for each direction that is not held, each spring a spatial tendon
-with its stiffness and its rest length: MuJoCo's law is ``stiffness (springlength - length)`` along the tendon, which is
-that of springtune, in tension and in compression. A fixed tendon spreads the load, and one actuator is the load, its
-control added to it: in the viewer the net moves, and a slider changes the load. Damping is that of the
-joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
+with its stiffness and its rest length, which has our law in tension and in compression. A fixed tendon spreads the
+load, and one actuator is the load: a slider of the viewer changes it. Damping is that of the joints, which MuJoCo's
+integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
 
-Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
-and so is the flex of two dimensions of MuJoCo 4. Its shear modulus and Lame's first constant, times the thickness t,
+Coupled springs of squared lengths (definition `delingette`) are the flex of two dimensions of MuJoCo 4, with
 
-    mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2), those of plane stress,
+    mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2) of plane stress
 
-are those of single triangles in MuJoCo 4.0.0, to rounding. In MuJoCo 3 young and poisson mean other constants: it
-refuses a file with a flex, by an attribute that it does not know. Bodies of a flex may have no damping in their joints,
-so a fixed tendon for each joint has it.
+for the thickness t. In MuJoCo 3 young and poisson mean other constants: it refuses a file with a flex. Bodies of a flex
+may have no damping in their joints, so a fixed tendon for each joint has it.
 """
 
 from collections.abc import Sequence

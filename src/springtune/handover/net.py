@@ -1,15 +1,11 @@
 r"""A network as plain arrays in SI units: what another program needs to have the same springs.
 
-Inside, stiffnesses are multiples of a reference stiffness, forces are over it, and energies know their meshes. Here
-everything stands written out: springs in N/m, energies besides them as `Terms` with their formula, masses in kg, forces
-in N, and a header that says where all of it comes from and how far off it is.
-
-With particles at x, the springs, e, and the terms add up to the energy
+With particles at x, the springs, e, and the `Terms` of cells add up to the energy
 
 .. math:: W(x) = \sum_e \tfrac{1}{2} k_e (l_e - L_e)^2 + \sum_{terms} W_{cell}
 
-and an equilibrium has ``-dW/dx + forces = 0`` in all directions that are not held. With linear kinematics W is
-the quadratic form of its second derivative at rest.
+and an equilibrium has ``-dW/dx + forces = 0`` in all directions that are not held. With linear kinematics W is the
+quadratic form of its second derivative at rest.
 """
 
 import inspect
