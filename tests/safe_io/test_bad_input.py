@@ -42,36 +42,7 @@ def sizes(count):
     return "[" + ", ".join(f"{1 + number / 1e4:.4f} mm" for number in range(count)) + "]"
 
 
-def many_scenes():
-    """A product of lists that are each within their limit."""
-    names = [f"m{number}" for number in range(120)]
-    materials = ", ".join(f"{name}: {{young_modulus: 1 GPa, poisson_ratio: 0.3}}" for name in names)
-    text = SMALL.replace("material: steel", f"material: [{', '.join(names)}]").replace(
-        "steel: {", f"{materials}, steel: {{"
-    )
-    return text.replace("5 mm", sizes(9000))
-
-
-def scattered_grids():
-    """Few scenes, each of a beam and a mesh size that no other one has."""
-    names = [f"b{number}" for number in range(420)]
-    text = SMALL.replace("beams: {", "beams: {" + "".join(f"{name}: {{length: 1 m, height: 1 m}}, " for name in names))
-    rest = "mesh_type: structured, material: steel, load: traction, force: 1 kN, definition: lattice}"
-    for number, name in enumerate(names):
-        listed = ", ".join(f"{2 + number + part / 100:.2f} mm" for part in range(15))
-        text += f"  {name}: {{beam: {name}, mesh_size: [{listed}], {rest}\n"
-    return text
-
-
 STUDIES = {
-    "many scenes": (
-        many_scenes(),
-        "grids.g: 1080000 scenes (9000 mesh_size x 120 material); a study has at most 1000000: give shorter lists",
-    ),
-    "a dense dataset": (
-        scattered_grids(),
-        "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
-    ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
     "aliases of aliases": (
