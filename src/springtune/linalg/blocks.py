@@ -52,7 +52,7 @@ class Grid(NamedTuple):
 
 
 def row_pointers(rows: np.ndarray, count: int) -> np.ndarray:
-    """Where each row begins among sorted rows, shape (count + 1,)."""
+    """Start of each row among sorted rows, shape (count + 1,)."""
     return np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))]).astype(np.int32)
 
 

@@ -39,10 +39,10 @@ class Factor(Protocol):
         """Solve for right-hand sides, shape (unknowns,) or (unknowns, n)."""
 
     def step(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, for a step of Newton's method."""
+        """Solve as accurately as a step of Newton's method needs."""
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, but only an estimate."""
+        """Estimate the solution."""
 
 
 class SuperLUFactor:
@@ -246,7 +246,7 @@ class PinnedFactor:
     step = solve
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, of one right-hand side and without a correction."""
+        """Solve for one right-hand side without a correction."""
         half = self._factor.lower(right)
         return self._factor.upper(half + self._columns @ (self._inverse @ (self._columns.T @ half)))
 

@@ -240,11 +240,11 @@ class Multigrid:
             raise SingularError("a particle is free to move: its springs, if any, are in one line")
 
     def step(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, so far as a step of Newton's method goes."""
+        """Solve as accurately as a step of Newton's method needs."""
         return self.solve(right, STEP_RESIDUAL)
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, to a percent."""
+        """Solve to a percent."""
         return self.solve(right, 1e-2)
 
     @cached_property

@@ -122,7 +122,7 @@ class Body:
 
     @property
     def points(self) -> np.ndarray:
-        """Where the particles are [m], shape (n_points, 2)."""
+        """Current positions of the particles [m], shape (n_points, 2)."""
         return self.network.mesh.points + self.displacements
 
     def missing(self, share: float) -> np.ndarray:
@@ -272,13 +272,13 @@ class Contact:
         sides = [_Sides(body) for body in self.all]
         for owner in range(len(self.all)):
             if self.floor and owner < len(self.bodies):
-                parts.append(self._on_floor(owner, sides[owner]))
+                parts.append(self._floor_contacts(owner, sides[owner]))
             for target in range(len(self.all)):
                 if target != owner and min(owner, target) < len(self.bodies):
-                    parts.append(self._between(owner, sides[owner], target, sides[target]))
+                    parts.append(self._contacts_between(owner, sides[owner], target, sides[target]))
         return Contacts(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Contacts)))
 
-    def _on_floor(self, owner: int, sides: _Sides) -> Contacts:
+    def _floor_contacts(self, owner: int, sides: _Sides) -> Contacts:
         """Corners of a body near the floor."""
         places = self.all[owner].points[sides.corners]
         near = places[:, 1] <= REACH_SIZES * self.size
@@ -293,10 +293,10 @@ class Contact:
             gaps=places[near, 1],
         )
 
-    def _between(self, owner: int, own: _Sides, target: int, met: _Sides) -> Contacts:
+    def _contacts_between(self, owner: int, own: _Sides, target: int, met: _Sides) -> Contacts:
         """Corners of one body near edges of another one."""
         places, (after, before) = self.all[owner].points[own.corners], self.all[target].neighbours
-        rows, edge = self._facing(places, own, met, before)
+        rows, edge = self._facing_edges(places, own, met, before)
         ahead, behind = met.turn[edge] < -STRAIGHT_SINE, met.turn[before[edge]] < -STRAIGHT_SINE
         rows = np.concatenate([rows, rows[ahead], rows[behind]])
         edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
@@ -311,7 +311,7 @@ class Contact:
             gaps=np.einsum("na,na->n", offset, met.normals[edge]),
         )
 
-    def _facing(
+    def _facing_edges(
         self, places: np.ndarray, own: _Sides, met: _Sides, before: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Corners near an edge that faces them, by their number in the outline, and the nearest such edge of each."""
@@ -417,8 +417,8 @@ class Contact:
             missing = [body.missing(share) for body in self.bodies]
         if not all(np.isfinite(part).all() for part in missing):
             return None
-        known = self._known(contacts)
-        more = self._turning(contacts, known)
+        known = self._last_forces(contacts)
+        more = self._turning_stiffness(contacts, known)
         drag = np.zeros((len(known), 2))
         if self.friction:
             rubbing, stiffening, drag = self._friction(contacts, known)
@@ -428,9 +428,9 @@ class Contact:
         try:
             tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
             quadratic = _Quadratic(tangents, missing, rows, contacts.gaps, known > 0)
-            found = self._closed(quadratic) if near else None
+            found = self._solve_closed(quadratic) if near else None
             if found is None:
-                found = self._opening(quadratic)
+                found = self._solve_opening(quadratic)
         except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
             return None
         steps, forces = found
@@ -443,7 +443,7 @@ class Contact:
         self.contacts, self.forces, self.drag = contacts, forces, drag
         return longest
 
-    def _opening(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray]:
+    def _solve_opening(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray]:
         """Return steps and contact forces of the quadratic minimum under all contact conditions.
 
         Few of many contacts close: the minimum takes the likely ones, and then adds those that it violates.
@@ -460,7 +460,7 @@ class Contact:
             for number, (solve, row) in enumerate(zip(solves, rows)):
                 answers[number] = np.hstack([answers[number], solve(row[:, more].toarray())])
             schur = sum(row[:, watched].T @ answer for row, answer in zip(rows, answers))
-            forces[watched] = _complementary(schur, opening[watched], likely[watched])
+            forces[watched] = _solve_complementarity(schur, opening[watched], likely[watched])
             steps = [part + answer @ forces[watched] for part, answer in zip(free, answers)]
             left = gaps + sum(row.T @ part for row, part in zip(rows, steps))
             left[watched] = 0.0
@@ -468,11 +468,11 @@ class Contact:
             more = np.flatnonzero(left < min(-DEPTH_TOLERANCE * self.size, 0.5 * left.min()))
         return steps, forces
 
-    def _closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
+    def _solve_closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
         """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear.
 
         Contacts that pull are opened and those that close are added, a few times over. The tangent needs to be
-        definite only on the motions that closed contacts leave free. This is a true Newton step; `_opening` adds
+        definite only on the motions that closed contacts leave free. This is a true Newton step; `_solve_opening` adds
         resistance.
         """
         tangents, missing, rows, gaps, closed = quadratic
@@ -497,7 +497,7 @@ class Contact:
             closed = (closed & ~pulls) | closes
         return None
 
-    def _known(self, contacts: Contacts) -> np.ndarray:
+    def _last_forces(self, contacts: Contacts) -> np.ndarray:
         """Return the last step's contact forces on corners still near [N], shape (n_contacts,)."""
         old = self.contacts
         if old is None:
@@ -506,7 +506,7 @@ class Contact:
         keys = zip(contacts.owners, contacts.corners, contacts.targets, contacts.edges[:, 0])
         return np.array([forces.get(key, 0.0) for key in keys])
 
-    def _turning(self, contacts: Contacts, forces: np.ndarray) -> list[csc_array | None]:
+    def _turning_stiffness(self, contacts: Contacts, forces: np.ndarray) -> list[csc_array | None]:
         """Return the stiffness of contact forces as their edges turn, by body: the curvature of the gaps."""
         parts: list[csc_array | None] = [None] * len(self.bodies)
         for number, body in enumerate(self.bodies):
@@ -564,7 +564,7 @@ def _sum(first: csc_array | None, second: csc_array | None) -> csc_array | None:
 
 
 def _near(others: np.ndarray, places: np.ndarray, reach: np.ndarray | float) -> np.ndarray:
-    """Which places are within reach of the box around others, shape (n,)."""
+    """Mask of the places within reach of the box around others, shape (n,)."""
     reach = np.broadcast_to(reach, len(places))[:, None]
     return ((places >= others.min(axis=0) - reach) & (places <= others.max(axis=0) + reach)).all(axis=1)
 
@@ -583,7 +583,7 @@ def _depth(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
     return np.linalg.norm(offset - shares[:, :, None] * side, axis=2).min(axis=1).max(initial=0.0)
 
 
-def _complementary(schur: np.ndarray, opening: np.ndarray, likely: np.ndarray) -> np.ndarray:
+def _solve_complementarity(schur: np.ndarray, opening: np.ndarray, likely: np.ndarray) -> np.ndarray:
     """Return forces >= 0 that open the gaps ``opening + schur @ forces`` to >= 0 and act on closed contacts alone.
 
     The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and

@@ -110,7 +110,7 @@ class Continuation(NamedTuple):
     inverts: bool = False
 
 
-def continued(
+def continue_path(
     problem: LoadedNetwork, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
 ) -> Continuation:
     """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
@@ -149,7 +149,7 @@ def continued(
         way += [way[-1] + float(np.linalg.norm(found.u - point.u))]
         loads += [found.load]
         if np.isnan(limit) and abs(found.load) < abs(point.load) and unstable:
-            limit, lost = _top(way, loads), np.nan if lost == point.load else lost
+            limit, lost = _limit_load(way, loads), np.nan if lost == point.load else lost
             if not farthest:  # the top is between two points: a load next to it may be carried
                 return Continuation(
                     limit, lost, stable if abs(limit) >= (1 - LIMIT_LOAD_TOLERANCE) * abs(target) else None
@@ -165,7 +165,7 @@ def continued(
     return Continuation(limit, lost, None)
 
 
-def _top(way: list[float], loads: list[float]) -> float:
+def _limit_load(way: list[float], loads: list[float]) -> float:
     """Largest load of a path whose last point falls: that of the parabola through its last three points, if it is."""
     if len(way) < 3:
         return loads[-2]

@@ -105,7 +105,7 @@ class Energy(ABC):
 
     @property
     def moduli(self) -> dict[str, Any]:
-        """What it has besides the cells, by name."""
+        """Moduli by name."""
         return {one.name: getattr(self, one.name) for one in fields(self)[2:]}
 
     @property
@@ -327,13 +327,13 @@ class _SheetEnergy(Energy):
         """Derivatives of D and of J by each corner's position [1/m], and the law; NaN for inverted triangles."""
         moved = moved - moved[:, :1]
         area, (along, across) = self._rest_area, self._rest_slopes
-        first, second = self._apart(moved)
+        first, second = self._distortions(moved)
         by_x, by_y = first * along + second * across, second * along - first * across
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             law = self._law(*self._invariants(moved))
         return 2 * np.stack([by_x, by_y]) / area, area_slopes(self._rest + moved) / area, law
 
-    def _apart(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _distortions(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The two terms whose squares make D, F11 - F22 and F12 + F21."""
         (x, y), (along, across) = moved - moved[:, :1], self._rest_slopes
         area = self._rest_area
@@ -341,7 +341,7 @@ class _SheetEnergy(Energy):
 
     def _invariants(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """D and J - 1, NaN where a triangle is flat or inside out."""
-        first, second = self._apart(moved)
+        first, second = self._distortions(moved)
         growth = self._growth(moved) / self._rest_area
         return first**2 + second**2, np.where(growth > -1.0, growth, np.nan)
 
@@ -390,7 +390,7 @@ class YeohEnergy(_SheetEnergy):
     largest: float | np.ndarray = np.inf
 
     def objection(self, displacements: np.ndarray) -> str:
-        """As of `Energy`: the number of triangles stretched beyond the data."""
+        """Say how many triangles are stretched beyond the test data, or return an empty string."""
         if not np.isfinite(self.largest).any():
             return ""
         with np.errstate(invalid="ignore"):
@@ -469,7 +469,7 @@ class NeoHookeEnergy(_SheetEnergy):
         half, bulk = 0.5 * self.shear, self.bulk
 
         def imbalance(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            """What falls with v and vanishes in equilibrium, and its derivative."""
+            """Imbalance across the sheet, which falls with v, and its derivative."""
             y, grown = area - v / 1.5, np.exp(v)
             pull = distortion * np.exp(-v / 1.5)
             off = half * (pull + 4 * np.exp(-0.5 * y) * np.sinh(1.5 * y)) - 1.5 * bulk * grown * np.expm1(v)

@@ -158,7 +158,7 @@ class PatchTest:
 
     @cached_property
     def strip_fault(self) -> str:
-        """As the function `strip_fault` of the mesh."""
+        """Reason of the function `strip_fault`, computed once."""
         return strip_fault(self.mesh)
 
     @cached_property

@@ -3,8 +3,11 @@
 A spring of stiffness k_e and rest length L_e, with distance vector d and length l, pulls with ``k_e (l - L_e) d /
 l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
 
-Stiffnesses are multiples of one reference stiffness and loads are forces over it [m]: one solution serves all forces
-and stiffnesses of equal F/k. A network may have energies besides its springs, see `springtune.mechanics.energies`.
+Scaling: a network has relative stiffnesses, each spring's over one reference stiffness k [N/m]. Forces are computed
+over k, so their unit is m, and energies over k in m2; ``s = F / k`` is the load. One solution in s serves all forces and
+reference stiffnesses of equal F/k. Multiply a force or an energy by k to have it in N or J.
+
+A network may have energies besides its springs, see `springtune.mechanics.energies`.
 """
 
 import copy
@@ -168,19 +171,19 @@ class Network:
     # -- mechanics --------------------------------------------------------------------------------------------------
 
     def resistance(self, displacements: np.ndarray) -> np.ndarray:
-        """Return the force against displacements over the reference stiffness [m], shape (unknowns,)."""
+        """Return the force against displacements over k [m], shape (unknowns,)."""
         return self.reduce(self.forces(displacements))
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
-        """As `resistance`, with held directions [m], shape (n_points, 2)."""
+        """Return the force against displacements at all particles over k [m], shape (n_points, 2)."""
         total = np.zeros(self.held.shape)
         if self.has_springs:
-            total -= self._pattern.sum_springs(self._pulls(displacements))
+            total -= self._pattern.sum_springs(self._end_forces(displacements))
         for energy in self.energies:
             total += self._pattern.sum_cells(energy.corners, energy.forces(displacements))
         return total
 
-    def _stretched(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _spring_vectors(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return each spring's vector [m], its length [m] and the growth of its squared length [m2].
 
         Elongations are ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose digits at small strain.
@@ -190,19 +193,19 @@ class Network:
         squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
         return vectors, np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), squares
 
-    def _pulls(self, displacements: np.ndarray) -> np.ndarray:
-        """Return the force of each spring on its first end over the reference stiffness [m], shape (n_springs, 2)."""
-        vectors, lengths, squares = self._stretched(displacements)
+    def _end_forces(self, displacements: np.ndarray) -> np.ndarray:
+        """Return the force of each spring on its first end over k [m], shape (n_springs, 2)."""
+        vectors, lengths, squares = self._spring_vectors(displacements)
         with np.errstate(divide="ignore", invalid="ignore"):
             pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
         return pull[:, None] * vectors
 
     def spring_forces(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
-        """Return axial spring forces over the reference stiffness, tension positive [m]; energies are left out."""
+        """Return axial spring forces over k, tension positive [m]; energies are left out."""
         if linear:
             along = np.einsum("ij,ij->i", self.rest_vectors, self.stretch(displacements))
             return self.stiffness * along / self.rest_lengths
-        _, lengths, squares = self._stretched(displacements)
+        _, lengths, squares = self._spring_vectors(displacements)
         return self.stiffness * squares / (lengths + self.rest_lengths)
 
     def rounding(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
@@ -218,14 +221,14 @@ class Network:
             if self.energies:
                 sizes = sizes + np.einsum("abn,bn->na", np.abs(self._rest_couplings), np.abs(apart.T))
         else:
-            sizes = np.abs(self._pulls(displacements)) if self.has_springs else np.zeros(self.rest_vectors.shape)
+            sizes = np.abs(self._end_forces(displacements)) if self.has_springs else np.zeros(self.rest_vectors.shape)
             for energy in self.energies:
                 total += self._pattern.sum_cells(energy.corners, np.abs(energy.forces(displacements)))
         total += self._pattern.sum_springs(sizes, -sizes)
         return np.finfo(float).eps * self.reduce(total)
 
     def linear_resistance(self, displacements: np.ndarray) -> np.ndarray:
-        """As `resistance`, with linear kinematics."""
+        """Return the force against displacements in linear kinematics over k [m], shape (unknowns,)."""
         return self.reduce(self.linear_forces(displacements))
 
     def linear_forces(self, displacements: np.ndarray) -> np.ndarray:
@@ -246,8 +249,8 @@ class Network:
         return self._pattern.cell_couplings(self.energies)
 
     def energy(self, displacements: np.ndarray) -> float:
-        """Energy of the network over the reference stiffness [m2]."""
-        _, lengths, squares = self._stretched(displacements)
+        """Energy of the network over k [m2]."""
+        _, lengths, squares = self._spring_vectors(displacements)
         springs = 0.5 * float(self.stiffness @ (squares / (lengths + self.rest_lengths)) ** 2)
         return springs + sum(energy.value(displacements) for energy in self.energies)
 
@@ -346,7 +349,7 @@ class Network:
         return slack if looked_for else np.zeros_like(slack)
 
     def _mechanism(self, slack: np.ndarray) -> str:
-        """Where slack springs let a part move without resistance; or an empty string.
+        """Say where slack springs let a part move without resistance, or return an empty string.
 
         Rounding decides the sign of such a motion's stiffness. It is a mechanism if a little stiffness more in every
         spring makes the network stable, and a little less unstable.
@@ -368,15 +371,15 @@ class Network:
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> Factor:
         """Factorize the tangent at `displacements`, or at rest."""
-        if self._by_multigrid and self._loose:
-            raise SingularError(self._loose)
+        if self._by_multigrid and self._free_body:
+            raise SingularError(self._free_body)
         if self._by_multigrid and not (self._by_cholesky and follower is None):
             return self._multigrid(displacements, follower)
         return self.factorize_matrix(self.tangent(displacements, follower), symmetric=follower is None)
 
     @cached_property
-    def _loose(self) -> str:
-        """Which separate body is free to move, and how; or an empty string."""
+    def _free_body(self) -> str:
+        """Reason why a separate body is free to move, or an empty string."""
         edges, whole = self.mesh.edges, self.energies or self.stiffness.all()
         try:
             check_held(self.mesh.points, edges if whole else edges[self.stiffness != 0], self.held, "the network")
@@ -403,13 +406,13 @@ class Network:
         plain factor.
         """
         tried = self._indefinite
-        if tried and (pinned := self._pinned(matrix)):
+        if tried and (pinned := self._factorize_pinned(matrix)):
             return pinned
         factor = self._pattern.analysis.factorize(matrix.data)
         self._indefinite = factor is None and self.unknowns > PINS_FROM_UNKNOWNS
-        return self._pinned(matrix) if self._indefinite and not tried else factor
+        return self._factorize_pinned(matrix) if self._indefinite and not tried else factor
 
-    def _pinned(self, matrix: csc_array) -> Factor | None:
+    def _factorize_pinned(self, matrix: csc_array) -> Factor | None:
         """Return Cholesky's factor with pins; None if they do not suffice, or are not needed."""
         factor = factorize_pinned(matrix, self._pattern.analysis, self._pattern.pins)
         return factor if factor is not None and factor.negative_pivots else None
@@ -434,7 +437,7 @@ class Network:
             return self._pattern.analysis.factorize(self.tangent(displacements, follower).data) is not None
         try:
             if self._by_multigrid:
-                return not self._loose and self._multigrid(displacements, follower).negative_pivots == 0
+                return not self._free_body and self._multigrid(displacements, follower).negative_pivots == 0
             return self._superlu(self.tangent(displacements, follower)).negative_pivots == 0
         except SingularError:
             return False
@@ -463,7 +466,7 @@ class Network:
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""
-        return float(np.abs(self._stretched(displacements)[1] / self.rest_lengths - 1.0).max())
+        return float(np.abs(self._spring_vectors(displacements)[1] / self.rest_lengths - 1.0).max())
 
     def largest_change(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's vector over its length at rest [1]."""

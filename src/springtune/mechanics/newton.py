@@ -220,27 +220,27 @@ class Newton:
 
         It starts from rest if forces there are not finite or cells are inverted.
         """
-        here = self._at(start)
+        here = self._iterate_at(start)
         if not np.isfinite(here.residual) or self.network.inverted(start):
             rest = np.zeros_like(start)
             begin = self.problem.moved(self.s, rest)
-            here = Iterate(rest, self.s * self.problem.load, 1.0) if begin is rest else self._at(begin)
+            here = Iterate(rest, self.s * self.problem.load, 1.0) if begin is rest else self._iterate_at(begin)
         self._here = self._best = here
         self._factor: Factor | None = None
         self._factorizations = self._steps = self._since_best = 0
         self._keep, self._watched = False, True
         if not np.isfinite(here.residual):
-            return self._failed("no forces where it begins")
-        while not self._balanced():
+            return self._failure("no forces where it begins")
+        while not self._is_balanced():
             reason = self._iterate()
             if reason:
-                return self._failed(reason)
-        return self._refined()
+                return self._failure(reason)
+        return self._refine_solution()
 
-    def _at(self, displacements: np.ndarray) -> Iterate:
+    def _iterate_at(self, displacements: np.ndarray) -> Iterate:
         return Iterate(displacements, *self.problem.balance(self.s, displacements))
 
-    def _balanced(self) -> bool:
+    def _is_balanced(self) -> bool:
         """Return whether the residual is within the tolerance, or that of rounding the displacements."""
         displacements, _, residual = self._here
         if residual <= TOLERANCE:
@@ -287,14 +287,14 @@ class Newton:
         if not halvings and 2 * np.abs(step).max() > LONGEST_STEP * self.network.rest_lengths.min():
             length /= max(1.0, self.network.largest_change(step) / LONGEST_STEP)
         for _ in range(max(halvings, 1)):
-            there = self._at(displacements + length * step)
+            there = self._iterate_at(displacements + length * step)
             lower = not halvings or there.residual <= (1.0 - 1e-4 * length) * residual
             if lower and np.isfinite(there.residual) and not self.network.inverted(there.displacements):
                 return there
             length *= 0.5
         return None
 
-    def _refined(self) -> Equilibrium:
+    def _refine_solution(self) -> Equilibrium:
         """Return the equilibrium with the tangent there, refined if its estimated error is large."""
         here, self._factor = self._here, None
         try:
@@ -304,11 +304,11 @@ class Newton:
                 self._factor = None
                 self._factor = self.problem.factorize_tangent(self.s, refined.displacements)
         except SingularError:
-            return self._failed("singular tangent")
+            return self._failure("singular tangent")
         (moved, _, residual), reason = refined, uncertainty(error)
         return Equilibrium(moved, not reason, self._steps, residual, self._factor, reason, error)
 
-    def _failed(self, reason: str) -> Equilibrium:
+    def _failure(self, reason: str) -> Equilibrium:
         here = self._here
         return Equilibrium(here.displacements, False, self._steps, here.residual, self._factor, reason)
 

@@ -171,7 +171,7 @@ class Pattern:
         return {count: self._directed(corners, edges[count]) for count, corners in self.mesh.cells.items()}
 
     def _springs_of(self, corners: np.ndarray) -> np.ndarray:
-        """As `_cell_springs`, of all cells with so many corners, or of some: parts have energies of their own."""
+        """Return the springs of some cells as in `_cell_springs`: parts have energies of their own."""
         count = corners.shape[1]
         if len(corners) == len(self.mesh.cells[count]):
             return self._cell_springs[count]

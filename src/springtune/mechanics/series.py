@@ -112,7 +112,7 @@ class StablePath:
         """Return the weighted displacement [m] at a load [m] on the stable path, or NaN beyond it."""
         load = abs(s)
         if not self._series or load > self._series[-1][1]:
-            return self._reach(load)
+            return self._value_beyond(load)
         if not self._is_stable(load):
             return np.nan
         return float(self._series_of(load).measure(self.weights, np.array([s]))[0][0])
@@ -128,7 +128,7 @@ class StablePath:
             values, errors = series.measure(self.weights, loads)
         good, count, served, before = errors <= CURVE_TOLERANCE, 0, errors <= CURVE_TOLERANCE, None
         for _ in range(MAX_SERIES):
-            number, point = self._proved(series, loads[count:], values[count:], served)
+            number, point = self._served_loads(series, loads[count:], values[count:], served)
             if point is None:
                 break
             count += number
@@ -137,7 +137,7 @@ class StablePath:
             self._bracket(abs(loads[count - 1]), point, before)
             if count == len(loads) or self._unstable_from < np.inf:
                 break
-            if before is None and good[count:].any() and self._elsewhere(loads[np.flatnonzero(good)[-1]]):
+            if before is None and good[count:].any() and self._is_on_other_path(loads[np.flatnonzero(good)[-1]]):
                 self._turns = True
                 break
             try:
@@ -152,7 +152,7 @@ class StablePath:
             served = errors <= CURVE_TOLERANCE
         return values, good, count
 
-    def _proved(
+    def _served_loads(
         self, series: Expansion, loads: np.ndarray, values: np.ndarray, served: np.ndarray
     ) -> tuple[int, _Point | None]:
         """Return how many successive loads a series serves, and the corrected point at the last of them."""
@@ -201,14 +201,14 @@ class StablePath:
     def _bracket(self, last: float, point: _Point, before: np.ndarray | None) -> None:
         """Look at the stability between the point up to which the path is stable and the last of a series."""
         first = self.stable_to
-        steps = 1 + int(self._stretched(point.displacements, 0.0 if before is None else before) / CHECKED_STRETCH)
+        steps = 1 + int(self._stretch_between(point.displacements, 0.0 if before is None else before) / CHECKED_STRETCH)
         for load in np.linspace(first, last, steps + 1)[1:]:
             if not (point.stable if load == last else self._stable_at(load)):
                 self._unstable_from = load
                 break
             self.stable_to = load
 
-    def _stretched(self, displacements: np.ndarray, before: np.ndarray | float) -> float:
+    def _stretch_between(self, displacements: np.ndarray, before: np.ndarray | float) -> float:
         """Largest change of a spring's length from one place to another, over that at rest [1]."""
         network = self.problem.network
         lengths = [
@@ -232,7 +232,7 @@ class StablePath:
         return load <= self.stable_to
 
     def _count_stable(self, loads: np.ndarray) -> int:
-        """How many loads are on the stable path, by bisection."""
+        """Count the loads on the stable path, by bisection."""
         least, most = 0, len(loads)
         while least < most:
             middle = (least + most + 1) // 2
@@ -248,14 +248,14 @@ class StablePath:
         A tangent factorized near by is accurate enough to see it.
         """
         count = int(stable.sum())
-        doubtful = np.abs(left_out(loads[:count], values[:count])) > CURVE_TOLERANCE * np.abs(values[:count])
+        doubtful = np.abs(trend_deviation(loads[:count], values[:count])) > CURVE_TOLERANCE * np.abs(values[:count])
         for place in np.flatnonzero(doubtful):
             s = loads[place]
             series = self._series_of(abs(s))
             guess = series.at(s - series.s)[1]
             point = self._corrected(s, values[place], guess, self._far.factor, True)
             if not point.error <= CURVE_TOLERANCE:
-                values[place] = point.value if point.converged else self._solved(s, guess)
+                values[place] = point.value if point.converged else self._solved_value(s, guess)
                 stable[place] = np.isfinite(values[place])
 
     def _check_others(self, loads: np.ndarray, values: np.ndarray, good: np.ndarray, found: np.ndarray) -> None:
@@ -283,21 +283,21 @@ class StablePath:
         if self._turns and self.problem.network.unknowns > MOST_UNKNOWNS:
             return
         for place in np.flatnonzero(~found):
-            if self._turns and good[place] and self._elsewhere(loads[place]):
+            if self._turns and good[place] and self._is_on_other_path(loads[place]):
                 return
-            values[place] = self._reach(abs(loads[place]))
+            values[place] = self._value_beyond(abs(loads[place]))
             found[place] = stable[place] = np.isfinite(values[place])
             if self.end and abs(loads[place]) > self.stable_to:
                 return
 
-    def _elsewhere(self, s: float) -> bool:
+    def _is_on_other_path(self, s: float) -> bool:
         """Return whether the series about rest now follows another, unstable path."""
         network, displacements = self.problem.network, self._rest.at(s)[1]
         missing = s * self.problem.load - network.resistance(displacements)
         near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
         return near and not network.is_stable(displacements)
 
-    def _reach(self, load: float) -> float:
+    def _value_beyond(self, load: float) -> float:
         """Return the weighted displacement at a load beyond the series, or NaN off the stable path."""
         while self.stable_to < load and not self.end:
             self._advance(load)
@@ -309,7 +309,7 @@ class StablePath:
         sigma = series.parameter(s, farthest)
         if max(error, missed * (sigma / farthest) ** ERROR_POWER) <= 0.1 * CURVE_TOLERANCE:
             return value
-        return self._solved(s, series.at(sigma)[1])
+        return self._solved_value(s, series.at(sigma)[1])
 
     def _solve(self, s: float, guess: np.ndarray) -> tuple[np.ndarray | None, Factor | None]:
         """Return displacements (n_points, 2) and factor of the equilibrium next to a guess; None if there is none."""
@@ -328,7 +328,7 @@ class StablePath:
         except SingularError:
             return found.displacements, None
 
-    def _solved(self, s: float, guess: np.ndarray) -> float:
+    def _solved_value(self, s: float, guess: np.ndarray) -> float:
         """Weighted displacement of the stable equilibrium next to a guess; NaN where there is none."""
         displacements, factor = self._solve(s, guess)
         if displacements is None or factor is None:
@@ -361,7 +361,7 @@ class StablePath:
         else:
             farthest *= 0.9
         start = 0.0 if displacements is None else displacements
-        while self._stretched(series.at(farthest)[1], start) > CHECKED_STRETCH:
+        while self._stretch_between(series.at(farthest)[1], start) > CHECKED_STRETCH:
             farthest *= 0.75
         self._end_step(series, farthest)
 
@@ -386,7 +386,7 @@ class StablePath:
 
 
 class LinearPath:
-    """As `StablePath`, of a network with linear kinematics, whose displacements are in proportion to the load."""
+    """Path of a network in linear kinematics, with the interface of `StablePath`."""
 
     end = ""
 
@@ -400,7 +400,7 @@ class LinearPath:
         return self._slope * s
 
 
-def left_out(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def trend_deviation(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return how far values differ from the polynomials through three neighbours on either side; 0 without enough.
 
     `x`, `y` have shape (n,); `x` is sorted either way.

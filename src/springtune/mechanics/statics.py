@@ -14,7 +14,7 @@ import numpy as np
 
 from ..linalg.factors import SingularError as SingularError
 from ..problem.status import Status
-from .continuation import continued
+from .continuation import continue_path
 from .expansion import Expansion
 from .newton import Equilibrium, LoadedNetwork, uncertainty
 
@@ -91,7 +91,7 @@ class StaticProblem(LoadedNetwork):
 
     @cached_property
     def long_rest(self) -> Expansion:
-        """As `rest`, of higher order."""
+        """Series about rest of higher order."""
         return self.rest.extended(HIGH_ORDER)
 
     def linear(self, s: float) -> Equilibrium:
@@ -153,12 +153,12 @@ class StaticProblem(LoadedNetwork):
                 rest = np.zeros(found.displacements.shape)
                 if near and (
                     change <= UNSNAPPED_CHANGE
-                    or self._joined(0.0, rest, s, found.displacements, s * self.slope)
-                    or self._unstable(s, found)
+                    or self._has_no_snap(0.0, rest, s, found.displacements, s * self.slope)
+                    or self._is_unstable(s, found)
                 ):
                     return replace(found, iterations=iterations)
                 break
-        return self._in_steps(s, found, iterations)
+        return self._solve_in_steps(s, found, iterations)
 
     def departure(self, s: float, displacements: np.ndarray) -> str:
         """Return why the path from rest does not lead to a stable equilibrium; mostly empty."""
@@ -172,7 +172,7 @@ class StaticProblem(LoadedNetwork):
             return "the path from rest leads to another stable equilibrium" if apart else ""
         return message if found.limit_share < 1 else ""
 
-    def _joined(
+    def _has_no_snap(
         self, s: float, here: np.ndarray, to: float, there: np.ndarray, guess: np.ndarray, bend: float = 0.25
     ) -> bool:
         """Return whether the way from one equilibrium to the next is stable in its middle, without a snap.
@@ -193,7 +193,7 @@ class StaticProblem(LoadedNetwork):
                 return True
         return self.holds(half, middle)
 
-    def _unstable(self, s: float, found: Equilibrium) -> bool:
+    def _is_unstable(self, s: float, found: Equilibrium) -> bool:
         """Return whether a path leaves an equilibrium; flutter does not count."""
         assert found.factor is not None  # of what converged
         try:
@@ -201,7 +201,7 @@ class StaticProblem(LoadedNetwork):
         except SingularError:
             return True
 
-    def _in_steps(self, s: float, direct: Equilibrium, iterations: int) -> Equilibrium:
+    def _solve_in_steps(self, s: float, direct: Equilibrium, iterations: int) -> Equilibrium:
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
         done, step = 0.0, 0.25  # of the load
         last = before = np.zeros(self.network.held.shape)
@@ -215,12 +215,14 @@ class StaticProblem(LoadedNetwork):
             # Where springs are far from where the path pointed, some of them have snapped.
             missed = self.network.largest_change(found.displacements - guess) > SURPRISING_CHANGE
             looked_at = found.converged and np.isnan(unstable)
-            leaves = looked_at and self._unstable(there, found)
+            leaves = looked_at and self._is_unstable(there, found)
             bend = 0.25 * step / (step + last_step)
-            apart = looked_at and not leaves and not self._joined(here, last, there, found.displacements, guess, bend)
+            apart = (
+                looked_at and not leaves and not self._has_no_snap(here, last, there, found.displacements, guess, bend)
+            )
             limit, inverts, failed = np.nan, False, apart or not found.converged
             if failed and step <= SMALLEST_STEP and last_step:
-                limit, lost, end, inverts = continued(self, here, last, before, there)
+                limit, lost, end, inverts = continue_path(self, here, last, before, there)
                 if np.isnan(unstable) and not limit / s <= lost / s:
                     unstable = lost / s
                 if end is not None and np.isnan(lost):
@@ -229,7 +231,7 @@ class StaticProblem(LoadedNetwork):
                     close = (
                         near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISING_CHANGE
                     )
-                    if close and not self._unstable(there, near):
+                    if close and not self._is_unstable(there, near):
                         found, failed, missed = near, False, False
             if not failed and (step <= SHORTEST_STEP or not missed):
                 if leaves or missed and np.isnan(unstable):
@@ -259,7 +261,7 @@ class StaticProblem(LoadedNetwork):
 
     def _snaps(self, s: float, direct: Equilibrium, here: float, last: np.ndarray, before: np.ndarray) -> bool:
         """Return whether a path that turns back beyond a load regains the whole load in a stable equilibrium."""
-        if not direct.converged or self._unstable(s, direct):
+        if not direct.converged or self._is_unstable(s, direct):
             return False
         way = float(np.linalg.norm(self.network.reduce(direct.displacements - last)))
-        return continued(self, here, last, before, s, way / WAY_INCREMENTS).end is not None
+        return continue_path(self, here, last, before, s, way / WAY_INCREMENTS).end is not None

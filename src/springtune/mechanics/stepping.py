@@ -288,7 +288,7 @@ class _ExplicitSteps(Stepper):
             self.threads.shutdown()
 
     def _advance_energies(self, steps: int) -> None:
-        """As the kernels, of a network whose energies are not compiled."""
+        """Advance a network with energies, which are not compiled."""
         motion, step, u, v = self.motion, self._numbers[1], self._u[0], self._v[0]
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(steps):
@@ -308,7 +308,7 @@ class _ExplicitSteps(Stepper):
 
 
 def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, threads: int) -> tuple[int, int, int]:
-    """How the rows of a network are advanced: in blocks, some steps of a block before those far from it."""
+    """Return threads, rows of a block and steps of a pass, see `springtune.mechanics.kernels`."""
     rows, entries = len(pointers) - 1, int(pointers[-1])
     each = of_row + of_entry * entries / max(1, rows)
     for count in range(min(threads, max(1, entries // LEAST_ENTRIES_A_THREAD)), 1, -1):

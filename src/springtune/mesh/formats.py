@@ -129,15 +129,15 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
         If the file is unreadable or too large, has no linear triangles or quadrilaterals or other cells, cells with
         missing points, points that are not finite or not in one plane, or cells without area.
     """
-    return _assembled(path, _file_content(path), unit)[0]
+    return _build_mesh(path, _file_content(path), unit)[0]
 
 
 def read_stored(path: str | Path) -> Mesh:
     """Read a mesh that `write_mesh` wrote and whose checksum was compared: of any size."""
-    return _assembled(path, _by_meshio(library().read(path)), 1.0, np.inf)[0]
+    return _build_mesh(path, _by_meshio(library().read(path)), 1.0, np.inf)[0]
 
 
-def _assembled(
+def _build_mesh(
     path: str | Path, content: Content, unit: float, most: float = MOST_FILE_POINTS
 ) -> tuple[Mesh, np.ndarray]:
     """Return the mesh of a file, and its particles' numbers in the file; `unit` in m."""
@@ -154,7 +154,7 @@ def _assembled(
     with np.errstate(over="ignore"):  # what is too far away is refused
         points = _read_points(path, unit * content.points, used)
     for count, corners in joined.items():
-        joined[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
+        joined[count] = _orient_cells(path, points, np.searchsorted(used, corners))
     return Mesh(points, joined.get(3, no_cells(3)), joined.get(4, no_cells(4))), used
 
 
@@ -293,7 +293,7 @@ def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.n
     return points[:, :2].copy()
 
 
-def _counter_clockwise(path: str | Path, points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def _orient_cells(path: str | Path, points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Corner indices of cells, clockwise ones turned; refused where cells have no area."""
     areas = signed_areas(points, corners)
     flat = np.abs(areas) <= 1e-12 * np.abs(areas).max()
@@ -348,7 +348,7 @@ def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
         As `read_mesh`, and if the cells are not a conforming plane sheet.
     """
     content = _file_content(path)
-    mesh, used = _assembled(path, content, unit)
+    mesh, used = _build_mesh(path, content, unit)
     fault = sheet_fault(mesh)
     if fault:
         raise MeshError(f"{path}: {fault}")

@@ -64,7 +64,7 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
     if not shape.rounds:
         raise MeshError(f"{what}: its mesh is that of the file {shape.file}; read it with springtune.read_shape")
     sizes = _sizes(shape, size, dict(refined or {}), what)
-    stretches, lines, fine = _divided(shape, sizes)
+    stretches, lines, fine = _divide_sides(shape, sizes)
     (left, low), _ = shape.extent
     origin = np.array([left, low])
     regions = [one.inner for one in shape.rounds]
@@ -80,7 +80,7 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
         stretches = again
     else:
         raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
-    return _grouped(shape, made, chains, stretches, regions)
+    return _group_mesh(shape, made, chains, stretches, regions)
 
 
 def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -> dict[str, float]:
@@ -115,7 +115,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
     return {"": size, **refined}
 
 
-def _divided(
+def _divide_sides(
     shape: Outlined, sizes: Mapping[str, float]
 ) -> tuple[list[_Stretch], list[tuple[Point, Point, int]], dict[Point, float]]:
     """Stretches of the outlines, one for each edge; lines from points on none; and sizes at all named points."""
@@ -148,10 +148,14 @@ def _divided(
                 ends = side.divided(max(count, 1), begin, end)
                 stretches += _Stretch(side, begin, end, inner, outer).cut(ends)
     fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
-    return _apart(stretches, shape.name), _lines(shape, {point: fine[point] for point in inside.values()}), fine
+    return (
+        _separate_chords(stretches, shape.name),
+        _lines(shape, {point: fine[point] for point in inside.values()}),
+        fine,
+    )
 
 
-def _apart(stretches: list[_Stretch], name: str) -> list[_Stretch]:
+def _separate_chords(stretches: list[_Stretch], name: str) -> list[_Stretch]:
     """Stretches of arcs halved until their chords are well apart from other ones: walls may be thin."""
     for _ in range(MOST_ROUNDS):
         numbers: dict[Point, int] = {}
@@ -256,7 +260,7 @@ def _netgen(
     return made._replace(points=placed), chains, divided
 
 
-def _grouped(
+def _group_mesh(
     shape: Outlined,
     made: Triangulation,
     chains: list[list[int]],

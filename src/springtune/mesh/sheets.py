@@ -23,7 +23,7 @@ def sheet_fault(mesh: Mesh) -> str:
     Cells must be convex and meet in entire edges, at most two in each, without overlaps. Rounds of the outline must
     not touch themselves or each other: no slits, hanging points, or cells that meet only in a point.
     """
-    fault = not_convex(mesh)
+    fault = convexity_fault(mesh)
     if fault:
         return fault
     outline, fault = outline_of(mesh)
@@ -59,8 +59,8 @@ def sheet_fault(mesh: Mesh) -> str:
     return ""
 
 
-def not_convex(mesh: Mesh) -> str:
-    """Which cells have a corner of 180 degrees or more, with the remedy; empty where none has."""
+def convexity_fault(mesh: Mesh) -> str:
+    """Return why cells have a corner of 180 degrees or more, with the remedy, or an empty string."""
     points = mesh.points
     for count, corners in mesh.cells.items():
         turns = [signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) for i in range(count)]
@@ -135,7 +135,7 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np
         near = (low[one, 1] <= high[other, 1]) & (low[other, 1] <= high[one, 1])
         near &= (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2))
         one, other = one[near], other[near]
-        distances = _apart(start[one], end[one], start[other], end[other])
+        distances = _edge_distances(start[one], end[one], start[other], end[other])
         close = distances <= reach[one] + reach[other]
         found.append((one[close], other[close], distances[close]))
         begin = stop
@@ -143,7 +143,7 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np
     return one, other, distances
 
 
-def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+def _edge_distances(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Distance of each edge from a to b from the one from c to d [m]."""
 
     def left(one: np.ndarray, two: np.ndarray, three: np.ndarray) -> np.ndarray:
@@ -175,7 +175,7 @@ def rounds(edges: np.ndarray) -> list[np.ndarray]:
 
 
 def winding(points: np.ndarray, edges: np.ndarray, point: np.ndarray) -> int:
-    """How often edges wind about a point that is on none, counter-clockwise."""
+    """Return how often edges wind counter-clockwise about a point off them."""
     start, end = points[edges[:, 0]] - point, points[edges[:, 1]] - point
     left = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
     up = (start[:, 1] <= 0) & (end[:, 1] > 0) & (left > 0)
@@ -225,14 +225,14 @@ def box_fault(mesh: Mesh) -> str:
         box = mesh.points.max(axis=0) - low
         moved = replace(mesh, points=mesh.points - low) if low.any() else mesh
         try:
-            known = _misfilled(on_sides(moved, box), box)
+            known = _box_filling_fault(on_sides(moved, box), box)
         except MeshError as error:
             known = str(error)
         vars(mesh)["_box_fault"] = known
     return known
 
 
-def _misfilled(mesh: Mesh, box: np.ndarray) -> str:
+def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:
     """Return why a mesh does not fill a box exactly once, with the remedy, or an empty string.
 
     A conforming plane sheet whose outline is on the sides of the box has no slits, holes or overlaps of any width.
@@ -340,7 +340,7 @@ def bonded(mesh: Mesh, reach: float) -> Mesh:
 
 
 def _inside(bonds: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Which bonds (n, 2, 2) stay in a body or on its outline (m, 2, 2)."""
+    """Mask of the bonds (n, 2, 2) that stay in a body or on its outline (m, 2, 2)."""
     a, b = bonds[:, None, 0], bonds[:, None, 1]
     c, d = outline[:, 0], outline[:, 1]
 

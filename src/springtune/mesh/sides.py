@@ -52,7 +52,7 @@ class OutlineSide:
 
     @cached_property
     def arc(self) -> tuple[float, float, float, float] | None:
-        """Of an arc: semi-axes along x and y [m], angle at the start and by which it turns, counter-clockwise [rad]."""
+        """Semi-axes of an arc along x and y [m], start angle and counter-clockwise turn [rad]; None if straight."""
         if self.centre is None:
             return None
         centre = self.centre
@@ -147,7 +147,7 @@ class OutlineSide:
         inner = (self.parameter_of(first + (last - first) * i / count) for i in range(1, count))
         return [low, *inner, high]
 
-    def swept(self, origin: Point = (0.0, 0.0)) -> float:
+    def swept_area(self, origin: Point = (0.0, 0.0)) -> float:
         """Signed area between the side and a point [m2]: the sum over an outline is the area within."""
         (x, y), (u, v) = ((end[0] - origin[0], end[1] - origin[1]) for end in (self.start, self.end))
         if self.arc is None or self.centre is None:
@@ -228,10 +228,10 @@ class Round:
 def enclosed(sides: Sequence[OutlineSide]) -> float:
     """Signed area within a round of sides [m2], positive where it runs counter-clockwise."""
     # About a corner: coordinates far from the origin would cost digits.
-    return sum(side.swept(sides[0].start) for side in sides)
+    return sum(side.swept_area(sides[0].start) for side in sides)
 
 
-def turned(sides: Sequence[OutlineSide]) -> tuple[OutlineSide, ...]:
+def reversed_round(sides: Sequence[OutlineSide]) -> tuple[OutlineSide, ...]:
     """The same round the other way, from the same corner."""
     return tuple(OutlineSide(side.end, side.start, side.centre, side.group) for side in sides[::-1])
 
@@ -259,7 +259,7 @@ def polygon(sides: tuple[OutlineSide, ...]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(numbers)
 
 
-def _closed(count: int, first: int = 0) -> np.ndarray:
+def _closing_edges(count: int, first: int = 0) -> np.ndarray:
     """Edges (count, 2) of a polygon of so many points, numbered from the first on."""
     numbers = np.arange(count)
     return first + np.stack([numbers, np.roll(numbers, -1)], axis=1)
@@ -268,17 +268,17 @@ def _closed(count: int, first: int = 0) -> np.ndarray:
 def winds_about(sides: tuple[OutlineSide, ...], point: Point) -> bool:
     """Return whether a round winds about a point that is not on it."""
     points, _ = polygon(sides)
-    return winding(points, _closed(len(points)), np.array(point)) != 0
+    return winding(points, _closing_edges(len(points)), np.array(point)) != 0
 
 
-def meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
+def find_meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
     """Return where sides of rounds meet off shared corners, or None: round and side of both, and the point [m]."""
     points, edges, reaches = [], [], []
     names: list[tuple[int, int]] = []
     size = max(math.dist(*extent(sides)) for sides in rounds)
     for which, sides in enumerate(rounds):
         corners, numbers = polygon(sides)
-        edges.append(_closed(len(corners), len(names)))
+        edges.append(_closing_edges(len(corners), len(names)))
         points.append(corners)
         names += [(which, number) for number in numbers.tolist()]
         errors = [0.0 if side.arc is None else CHORD_ERROR * math.dist(*extent(sides)) for side in sides]

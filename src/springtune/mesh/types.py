@@ -82,7 +82,7 @@ class MeshType(Declaration):
         return found
 
     def particles(self, length: float, height: float, size: float) -> float:
-        """How many particles a mesh would have, about; parameters as of a call."""
+        """Approximate number of particles of a mesh of this size; lengths in m."""
         return (length / size + 1.5) * (height / (self.row_height * size) + 1.0)
 
     def refusal(self, length: float, height: float, size: float, box: str) -> str:

@@ -215,7 +215,7 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
         low, high = here.min(axis=1), here.max(axis=1)
         room = OUTSIDE_TOLERANCE * (high - low).max(axis=1, keepdims=True) + slack
         for cell in np.flatnonzero(((low <= room) & (high >= -room)).all(axis=1)):
-            shares = _shares(here[cell])
+            shares = _corner_weights(here[cell])
             if shares is not None and shares.min() > best:
                 best, found = float(shares.min()), (count, int(cell), shares)
     if found is None:
@@ -224,7 +224,7 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
     return found[0], found[1], shares / shares.sum()
 
 
-def _shares(corners: np.ndarray) -> np.ndarray | None:
+def _corner_weights(corners: np.ndarray) -> np.ndarray | None:
     """Weights of the corners of a cell, relative to a point, that interpolate there; None where they are not found."""
     if len(corners) == 3:
         after, before = corners[[1, 2, 0]], corners[[2, 0, 1]]

@@ -195,7 +195,7 @@ LOAD_KINDS = _Kinds({load.kind.name: load.kind for load in OWN_LOADS.values()})
 """Kinds of load by name."""
 
 
-def _adopted(name: str, load: Any) -> Load:
+def _check_load(name: str, load: Any) -> Load:
     """Load of another package; what its kind holds is in the kind's name, and so in the keys of results."""
     if not NAME.fullmatch(name):
         raise ValueError(f"it cannot name a load; {NAME_RULE}")
@@ -207,7 +207,7 @@ def _adopted(name: str, load: Any) -> Load:
     return replace(load, kind=replace(load.kind, name=f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:8]}"))
 
 
-LOADS = ExtensibleMapping("load", "loads", OWN_LOADS, _adopted)
+LOADS = ExtensibleMapping("load", "loads", OWN_LOADS, _check_load)
 """Loads by name."""
 
 KINEMATICS = ("nonlinear", "linear")

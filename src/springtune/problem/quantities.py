@@ -28,7 +28,7 @@ def quantity(value: float | str, kind: str, name: str) -> float:
 
 
 def positive(value: float | str, kind: str, name: str) -> float:
-    """As `quantity`, refusing values that are not above zero."""
+    """Return the number in SI units of a quantity above zero."""
     number = quantity(value, kind, name)
     if not number > 0:
         raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")

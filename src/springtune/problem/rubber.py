@@ -109,7 +109,7 @@ def _column(head: str, where: str) -> tuple[str, float]:
     return kind, size
 
 
-def told(test: TensileTest | str | Path) -> TensileTest:
+def read_test(test: TensileTest | str | Path) -> TensileTest:
     """Return a test; read it if its file is given."""
     return test if isinstance(test, TensileTest) else TensileTest.read(test)
 
@@ -204,7 +204,7 @@ def fit_rubber(
     >>> print(f"{result.status}: {1e3 * result.displacement:.0f} mm")
     solved: 108 mm
     """
-    test = told(uniaxial)
+    test = read_test(uniaxial)
     check_terms(terms, MOST_TERMS)
     found = fit(stress_columns(test.stretch, terms), test)
     if not found[0] > 0:
@@ -212,7 +212,7 @@ def fit_rubber(
     law = Rubber(found, float(f"{Rubber.excess('uniaxial', test.stretch).max():.{FIT_DIGITS}g}"), (), density, name)
     _check(law, test.name)
     others = {"equibiaxial": equibiaxial, "pure shear": pure_shear}
-    data = {"uniaxial": test} | {kind: told(other) for kind, other in others.items() if other is not None}
+    data = {"uniaxial": test} | {kind: read_test(other) for kind, other in others.items() if other is not None}
     errors = tuple((kind, relative_error(law.stress(kind, one.stretch), one)) for kind, one in data.items())
     return replace(law, test_errors=errors)
 

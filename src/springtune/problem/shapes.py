@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import Any
 
 from ..mesh.sheets import in_words
-from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, meeting, turned, winds_about
+from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, find_meeting, reversed_round, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_size, warn_of_thickness
 from .quantities import Number, nearest, positive, put, quantity
@@ -45,13 +45,13 @@ def _place(value: Any, name: str) -> Point:
     return _vector(value, "length", name, "('20 mm', '5 mm')")
 
 
-def _named(value: object, what: str, *, empty: bool = False) -> None:
+def _check_name(value: object, what: str, *, empty: bool = False) -> None:
     """Refuse what is not allowed as a name."""
     if not (isinstance(value, str) and (NAME.fullmatch(value) or (empty and not value))):
         raise ValueError(f"{what}: {value!r} cannot be a name; {NAME_RULE}")
 
 
-def _all_of(values: Any, wanted: type, name: str) -> tuple[Any, ...]:
+def _tuple_of(values: Any, wanted: type, name: str) -> tuple[Any, ...]:
     """Tuple of values of a type."""
     try:
         found = tuple(values)
@@ -97,7 +97,7 @@ class Segment:
         put(self, start=_place(self.start, "start of a segment"))
         if self.centre is not None:
             put(self, centre=_place(self.centre, "centre of a segment"))
-        _named(self.group, "group of a segment", empty=True)
+        _check_name(self.group, "group of a segment", empty=True)
 
 
 def _round(segments: Sequence[Segment], what: str) -> tuple[OutlineSide, ...]:
@@ -144,8 +144,8 @@ class Hole:
     part: str = ""
 
     def __post_init__(self) -> None:
-        put(self, outline=_all_of(self.outline, Segment, "outline of a hole"))
-        _named(self.part, "part of a hole", empty=True)
+        put(self, outline=_tuple_of(self.outline, Segment, "outline of a hole"))
+        _check_name(self.part, "part of a hole", empty=True)
         what = f"part {self.part!r}" if self.part else "hole"
         _round(self.outline, what)
         groups = [segment.group for segment in self.outline if segment.group]
@@ -247,7 +247,7 @@ class Support:
     y: Number | None = None
 
     def __post_init__(self) -> None:
-        _named(self.group, "group of a support")
+        _check_name(self.group, "group of a support")
         for axis in ("x", "y"):
             if getattr(self, axis) is not None:
                 value = quantity(getattr(self, axis), "length", f"support on {self.group!r}, {axis}")
@@ -283,7 +283,7 @@ class Traction:
     force: tuple[Number, Number]
 
     def __post_init__(self) -> None:
-        _named(self.group, "group of a traction")
+        _check_name(self.group, "group of a traction")
         force = _vector(self.force, "force", f"traction on {self.group!r}, force", "('4 kN', 0)")
         put(self, force=force)
 
@@ -318,7 +318,7 @@ class Pressure:
     follower: bool = False
 
     def __post_init__(self) -> None:
-        _named(self.group, "group of a pressure")
+        _check_name(self.group, "group of a pressure")
         put(self, pressure=quantity(self.pressure, "stress", f"pressure on {self.group!r}"))
         if not isinstance(self.follower, bool):
             raise ValueError(f"pressure on {self.group!r}, follower: {self.follower!r}; give True or False")
@@ -379,13 +379,13 @@ class Quantity:
     source: str = ""
 
     def __post_init__(self) -> None:
-        _named(self.name, "quantity")
+        _check_name(self.name, "quantity")
         what = f"quantity {self.name!r}"
         if self.kind not in COMPONENTS:
             raise ValueError(f"{what}: unknown kind {self.kind!r}; {nearest(str(self.kind), COMPONENTS)}")
         components = COMPONENTS[self.kind]
         if components:
-            _named(self.of, f"{what}, of")
+            _check_name(self.of, f"{what}, of")
             if self.component not in components:
                 raise ValueError(f"{what}: component {self.component!r}; give one of {', '.join(components)}")
         elif self.of or self.component:
@@ -437,11 +437,11 @@ class LoadCase:
     quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
-        _named(self.name, "load")
+        _check_name(self.name, "load")
         what = f"load {self.name!r}"
         kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
         for name, kind in kinds.items():
-            put(self, **{name: _all_of(getattr(self, name), kind, f"{what}, {name}")})
+            put(self, **{name: _tuple_of(getattr(self, name), kind, f"{what}, {name}")})
         try:
             gravity = tuple(float(one) for one in self.gravity)
         except (TypeError, ValueError):
@@ -574,16 +574,16 @@ class Shape:
     unit: Number = 1.0
 
     def __post_init__(self) -> None:
-        _named(self.name, "shape")
+        _check_name(self.name, "shape")
         what = f"shape {self.name!r}"
         put(self, thickness=positive(self.thickness, "length", f"{what}, thickness"))
         put(self, unit=positive(self.unit, "length", f"{what}, unit"))
-        put(self, outline=_all_of(self.outline, Segment, f"{what}, outline"))
-        put(self, holes=_all_of(self.holes, Hole, f"{what}, holes"))
+        put(self, outline=_tuple_of(self.outline, Segment, f"{what}, outline"))
+        put(self, holes=_tuple_of(self.holes, Hole, f"{what}, holes"))
         points = {name: _place(point, f"{what}, point {name!r}") for name, point in dict(self.points).items()}
         put(self, points=points)
         for name, load in dict(self.loads).items():
-            _all_of([load], LoadCase, f"{what}, loads")
+            _tuple_of([load], LoadCase, f"{what}, loads")
             if name != load.name:
                 raise ValueError(f"{what}, loads: {name!r} has a load that is named {load.name!r}; give both one name")
         put(self, file=str(self.file))
@@ -596,7 +596,7 @@ class Shape:
             return
         try:
             self._check_rounds()
-            put(self, points={name: self._placed(name, point) for name, point in points.items()})
+            put(self, points={name: self._place_point(name, point) for name, point in points.items()})
             for load in self.loads.values():
                 load.check_names(self.groups, self.points)
         except ValueError as error:
@@ -622,7 +622,7 @@ class Shape:
                 (x, y), (u, v) = before.tangent(1.0), side.tangent(0.0)
                 if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6:
                     raise ValueError(f"{what}: turns back on itself at {in_words(side.start)}; move a corner")
-        met = meeting([one for _, one in rounds])
+        met = find_meeting([one for _, one in rounds])
         if met:
             (first, i), (second, j), where = met
             if first == second:
@@ -637,15 +637,15 @@ class Shape:
             if inside and not hole.part:
                 raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
         if enclosed(sides) < 0:
-            back = tuple(Segment(one.start, one.centre, one.group) for one in turned(sides))
+            back = tuple(Segment(one.start, one.centre, one.group) for one in reversed_round(sides))
             put(self, outline=back)
         names = set(self.groups) & set(self.points)
         if names:
             raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")
 
-    def _placed(self, name: str, point: Point) -> Point:
+    def _place_point(self, name: str, point: Point) -> Point:
         """A named point, on the side that it is next to."""
-        _named(name, "point")
+        _check_name(name, "point")
         near = SIDE_TOLERANCE * max(high - low for low, high in zip(*self.extent))
         for one in self.rounds:
             for side in one.sides:
@@ -678,7 +678,7 @@ class Shape:
         holes = []
         for hole in self.holes:
             sides = _round(hole.outline, "hole")
-            holes.append(turned(sides) if enclosed(sides) < 0 else sides)
+            holes.append(reversed_round(sides) if enclosed(sides) < 0 else sides)
         found = [Round(_round(self.outline, "outline"), "")]
         filled = sorted((enclosed(sides), number) for number, sides in enumerate(holes) if self.holes[number].part)
         for number, (hole, sides) in enumerate(zip(self.holes, holes)):

@@ -74,10 +74,10 @@ def most_rotation_and_strain(gradients: np.ndarray, areas: np.ndarray) -> tuple[
     rotation = np.abs(by_x[..., 1] - by_y[..., 0]) / 2
     mean, half = (by_x[..., 0] + by_y[..., 1]) / 2, (by_x[..., 0] - by_y[..., 1]) / 2
     strain = np.abs(mean) + np.hypot(half, (by_x[..., 1] + by_y[..., 0]) / 2)
-    return _exceeded_rarely(rotation, areas), _exceeded_rarely(strain, areas)
+    return _area_quantile(rotation, areas), _area_quantile(strain, areas)
 
 
-def _exceeded_rarely(values: np.ndarray, areas: np.ndarray) -> float:
+def _area_quantile(values: np.ndarray, areas: np.ndarray) -> float:
     """Value that most of a body does not exceed, see `JUDGED_AREA_SHARE`."""
     order = np.argsort(values)
     # A hair less: where cells of some number make up the share exactly, rounding shall not ask for one more.

@@ -77,7 +77,7 @@ class Family:
     def at(self, points: np.ndarray) -> tuple[csr_array, np.ndarray]:
         """Rows that read u and v at points (n, 2) in turn, and distances from the body over its extent [1]."""
         space = self._level.space
-        found, local = self._level._located(points)
+        found, local = self._level._locate(points)
         shares = np.column_stack([1 - local.sum(axis=1), local]).clip(0)
         values, _ = shape_functions(space.degree, (shares / shares.sum(axis=1, keepdims=True))[:, 1:])
         ends = values.shape[1] * np.arange(len(points) + 1)

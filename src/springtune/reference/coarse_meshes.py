@@ -135,7 +135,7 @@ class CoarseMesh:
             moved = self.points.copy()
             moved[point] = where
             around = self.triangles[(self.triangles == point).any(axis=1)]
-            if int(point) not in fixed and len(around) and _shapely(moved, around):
+            if int(point) not in fixed and len(around) and _are_well_shaped(moved, around):
                 self.points, self.named = moved, self.named | {name: int(point)}
                 return
         corners = self.points[self.triangles]
@@ -203,7 +203,7 @@ def _area(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> np.ndarra
     return 0.5 * (one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
 
 
-def _shapely(points: np.ndarray, triangles: np.ndarray) -> bool:
+def _are_well_shaped(points: np.ndarray, triangles: np.ndarray) -> bool:
     """Whether triangles are counter-clockwise and not flat."""
     sides = points[triangles] - points[np.roll(triangles, 1, axis=1)]
     return bool((signed_areas(points, triangles) > 0.1 * (sides**2).sum(axis=(1, 2)) / 3).all())
@@ -229,7 +229,7 @@ class _Piece:
 
     @property
     def turn(self) -> float:
-        """By which its direction turns [rad]."""
+        """Turn of its direction from end to end [rad]."""
         one, other = (self.side.slope(parameter) for parameter in self.span)
         return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
 
@@ -238,7 +238,7 @@ class _Piece:
         return replace(self, span=(self.span[0], middle)), replace(self, span=(middle, self.span[1]))
 
 
-def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
+def _refine_pieces(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
     """Pieces that are short where others are near, and turn little."""
     while True:
         samples = np.array([piece.at(np.linspace(0, 1, PIECE_SAMPLES)) for piece in pieces])
@@ -301,7 +301,7 @@ def outline_mesh(
         cuts, on_it = _cut(piece.side, points, LENGTH_TOLERANCE * extent)
         placed.update(on_it)
         pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
-    mesh = _triangulated(shape.name, _refined(pieces, extent, largest_turn), names, extent)
+    mesh = _triangulated(shape.name, _refine_pieces(pieces, extent, largest_turn), names, extent)
     for name, point in points.items():
         where = np.array(point, dtype=float)
         if name in placed:

@@ -81,7 +81,7 @@ class _PartLaws:
         self.scales = np.array([laws[name][0] for name in names.tolist()])
 
     def response(self, strain: np.ndarray) -> Response:
-        """As of `Law`."""
+        """Evaluate the law of each part, see `Law`."""
         stress, tangent = np.empty(strain.shape), np.empty((*strain.shape, 3))
         for rows, law in self.rows:
             found = law.response(strain[rows])
@@ -89,7 +89,7 @@ class _PartLaws:
         return Response(stress, tangent)
 
     def energy(self, strain: np.ndarray) -> np.ndarray:
-        """As of `Law`."""
+        """Evaluate the law of each part, see `Law`."""
         total = np.empty(strain.shape[:-1])
         for rows, law in self.rows:
             total[rows] = law.energy(strain[rows])
@@ -113,7 +113,7 @@ class _FiniteLevel(Level, Body):
         super().__init__(problem, degree)
 
     def _matrices(self) -> np.ndarray:
-        """None: tangents take their place."""
+        """Return no matrices: tangents take their place."""
         return np.empty(0)
 
     def _solve(
@@ -179,7 +179,7 @@ class _FiniteLevel(Level, Body):
         return Level._solve(self, Level._matrices(self), self.load, self.held, self.given)[0]
 
     def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
-        """What the last step changes, relative."""
+        """Relative size of the last step."""
         return float(np.abs(step).max() / np.abs(moved).max())
 
     def _turning(self) -> csr_array:

@@ -94,10 +94,10 @@ def solve_finite_strain(
     # Lengths are over half the height.
     lengths = ("displacement", "mean_displacement", "profile", "x", "y", "displacements")
     scaled = {name: beam.height / 2 * getattr(fine, name) for name in lengths}
-    return replace(fine, error_estimate=_change(coarse, fine, kind) + fine.error_estimate, **scaled)
+    return replace(fine, error_estimate=_mesh_difference(coarse, fine, kind) + fine.error_estimate, **scaled)
 
 
-def _change(coarse: FiniteStrainSolution, fine: FiniteStrainSolution, kind: LoadKind) -> float:
+def _mesh_difference(coarse: FiniteStrainSolution, fine: FiniteStrainSolution, kind: LoadKind) -> float:
     """Relative change from a mesh to a finer one, an estimate of the error that is left."""
     middle = float(abs(coarse.displacement / fine.displacement - 1))
     mean = float(abs(coarse.mean_displacement / fine.mean_displacement - 1))
@@ -107,7 +107,7 @@ def _change(coarse: FiniteStrainSolution, fine: FiniteStrainSolution, kind: Load
 
 
 class Body:
-    """What is solved at finite strain: elements with a law, supports and a load that grows.
+    """Problem at finite strain: elements with a law, supports and a growing load.
 
     - `law`: `PlaneLaw` at points of integration.
     - `nodes_of` (elements, functions): Functions of each element.
@@ -137,7 +137,7 @@ class Body:
         while path[-1][0] < 1:
             done = path[-1][0]
             step = min(step, 1 - done)
-            guess = _extrapolated(path, done + step)
+            guess = _extrapolate(path, done + step)
             if len(path) == 1 and self.given.any():
                 guess = stress * step * self._slope
             found = self.equilibrium(guess, stress * (done + step))
@@ -154,14 +154,14 @@ class Body:
     def _joined(self, path: list[tuple[float, np.ndarray]], share: float, moved: np.ndarray, stress: float) -> bool:
         """Whether no snap lies between a stable equilibrium and the last one: the middle is stable, too."""
         middle = 0.5 * (path[-1][0] + share)
-        if self._is_stable(_extrapolated([*path, (share, moved)], middle), stress * middle):
+        if self._is_stable(_extrapolate([*path, (share, moved)], middle), stress * middle):
             return True
         # The straight way from rest shortens what turns; the parabola that begins as the linear solution does not.
         bent = 0.25 * (moved - stress * share * self._slope)
         little = np.linalg.norm(bent) <= LARGEST_BEND * np.linalg.norm(moved)
         return bool(len(path) == 1 and little and self._is_stable(0.5 * moved - bent, stress * middle))
 
-    def _judged(self, factor: SuperLUFactor, moved: np.ndarray, stress: float) -> bool:
+    def _is_stable_by_factor(self, factor: SuperLUFactor, moved: np.ndarray, stress: float) -> bool:
         """Whether an equilibrium is stable, so far as the factor of its tangent tells."""
         try:
             negative = factor.negative_pivots
@@ -222,7 +222,7 @@ class Body:
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
             if np.abs(step).max() <= TOLERANCE * np.abs(moved).max():
-                return moved, self._open(step, moved), self._judged(factor, moved, stress)
+                return moved, self._open(step, moved), self._is_stable_by_factor(factor, moved, stress)
         return None
 
     def _gradient(self, moved: np.ndarray) -> np.ndarray:
@@ -269,12 +269,12 @@ class Body:
         return np.repeat(unknowns, count, axis=1).ravel(), np.tile(unknowns, count).ravel()
 
     def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
-        """What the last step changes, relative: of the load's displacement."""
+        """Relative change of the load's displacement by the last step."""
         return float(abs((self.load * step).sum() / (self.load * moved).sum()))
 
 
 class _Sheet(Body):
-    """What is solved of a sheet of height 2 with E = 1: half of it where the load keeps it symmetric."""
+    """Problem of a sheet of height 2 with E = 1; half of it if the load is symmetric."""
 
     def __init__(self, aspect_ratio: float, law: "PlaneLaw", count: int, kind: LoadKind, follower: bool) -> None:
         self.kind, self.law = kind, law
@@ -337,7 +337,7 @@ class _Sheet(Body):
 
 
 def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
-    """What a pressure changes with displacements: it acts along the cofactor of the deformation times the normal."""
+    """Derivative of a following pressure's forces by displacements: cofactor of the deformation times the normal."""
     slopes = np.stack([one[0].grad[along] for one in side.basis])
     blocks = np.einsum("iep,jep->ije", shapes, slopes) * (1 if along == 0 else -1)
     rows, columns = np.broadcast_arrays(side.element_dofs[:, None], side.element_dofs[None])
@@ -374,17 +374,17 @@ def _element_ends(length: float, count: int, kind: LoadKind) -> tuple[np.ndarray
     near = np.linspace(0, 1, count + 1) ** GRADING_POWER
     both = np.concatenate([near, 2 - near[-2::-1]])
     if kind.along == 0:
-        half = _spread(near, length / 2, count)
+        half = _graded_coordinates(near, length / 2, count)
         return half if kind.symmetric else np.concatenate([half, length - half[-2::-1]]), both
     if any(side != LEFT for side, _ in kind.held):  # corners at the loaded end, too
-        half = _spread(near, length / 2, count)
+        half = _graded_coordinates(near, length / 2, count)
         ends = np.concatenate([half, length - half[-2::-1]])
     else:
-        ends = _spread(near, length, count, None if kind.symmetric else MOST_ELEMENT_RATIO)
+        ends = _graded_coordinates(near, length, count, None if kind.symmetric else MOST_ELEMENT_RATIO)
     return ends, 1 - near[::-1] if kind.symmetric else both
 
 
-def _spread(near: np.ndarray, length: float, count: int, most: int | None = None) -> np.ndarray:
+def _graded_coordinates(near: np.ndarray, length: float, count: int, most: int | None = None) -> np.ndarray:
     """Coordinates from 0 to length, graded within 1 of 0 and even beyond, there of so many elements at most."""
     if length <= 1:
         return near * length
@@ -393,7 +393,7 @@ def _spread(near: np.ndarray, length: float, count: int, most: int | None = None
     return np.concatenate([near, np.linspace(1, length, 1 + columns)[1:]])
 
 
-def _extrapolated(path: list[tuple[float, np.ndarray]], share: float) -> np.ndarray:
+def _extrapolate(path: list[tuple[float, np.ndarray]], share: float) -> np.ndarray:
     """Displacements at a share of the load, by the polynomial through those before."""
     shares, moved = zip(*path)
     return np.asarray(krogh_interpolate(shares, np.array(moved), share))
@@ -404,7 +404,7 @@ _Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]
 
 
 class Law(Protocol):
-    """What a body asks of its law: stress and tangent at Green's strains xx, yy and 2 xy, shape (..., 3), over E."""
+    """Interface of a law: stress and tangent at Green's strains xx, yy and 2 xy, shape (..., 3), over E."""
 
     def response(self, strain: np.ndarray) -> "Response":
         """Stress and tangent."""
@@ -460,12 +460,12 @@ class Yeoh(PlaneLaw):
         self.coefficients = coefficients
 
     def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """As of `PlaneLaw`."""
+        """Energy of t and d."""
         excess = trace + 1 / d - 3
         return np.asarray(sum(c * excess**n for n, c in enumerate(self.coefficients, 1)))
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """As of `PlaneLaw`, of W = sum_n c_n x^n with x = t + 1/d - 3."""
+        """Derivatives of W = sum_n c_n x^n with x = t + 1/d - 3."""
         excess = trace + 1 / d - 3
         first = sum(n * c * excess ** (n - 1) for n, c in enumerate(self.coefficients, 1)) + np.zeros_like(excess)
         second = np.zeros_like(excess)
@@ -484,7 +484,7 @@ class NeoHooke(PlaneLaw):
         self.plane = plane
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """As of `PlaneLaw`, of the module's energy; in plane stress the stretch z across is eliminated."""
+        """Derivatives of the module's energy; in plane stress the stretch z across is eliminated."""
         z = self._across(trace, d)
         parts = self._parts(trace, d, z)
         second = [parts["tt"], parts["td"], parts["dd"]]
@@ -494,7 +494,7 @@ class NeoHooke(PlaneLaw):
         return (parts["t"], parts["d"]), second
 
     def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """As of `PlaneLaw`."""
+        """Energy of t and d."""
         z = self._across(trace, d)
         volume = z * np.sqrt(d)
         isochoric = volume ** (-2 / 3) * (trace + z**2) - 3
@@ -538,11 +538,11 @@ class StVenant:
         self.stiffness = stiffness
 
     def energy(self, strain: np.ndarray) -> np.ndarray:
-        """As of `Law`."""
+        """Evaluate the law, see `Law`."""
         return np.asarray(0.5 * (strain @ self.stiffness * strain).sum(axis=-1))
 
     def response(self, strain: np.ndarray) -> "Response":
-        """As of `Law`."""
+        """Evaluate the law, see `Law`."""
         return Response(strain @ self.stiffness, np.broadcast_to(self.stiffness, (*strain.shape, 3)))
 
 

@@ -160,11 +160,11 @@ class _Box:
         while True:
             places = [chebyshev_points(count) for count in self.counts]
             answers, estimate = self._solve([(along, across) for along in places[0] for across in places[1]])
-            values = _well_behaved(answers).reshape(4, *self.counts)
-            promised = [_promised(np.moveaxis(values[:2], axis, 1)) for axis in (1, 2)]
+            values = _interpolated_values(answers).reshape(4, *self.counts)
+            promised = [_expected_error(np.moveaxis(values[:2], axis, 1)) for axis in (1, 2)]
             goal = (1 - NODE_SHARE) * self.tolerance / SAFETY_FACTOR
             if max(promised) <= goal:
-                error_estimate = self._compared(values, checks, estimate)
+                error_estimate = self._error_at_checks(values, checks, estimate)
                 if error_estimate <= self.tolerance:
                     return values, error_estimate
             wide = [count > 1 for count in self.counts]
@@ -191,8 +191,8 @@ class _Box:
             if (along, across) not in self.solved:
                 if self.most is not None and len(self.solved) >= self.most:
                     raise self._failure(f"more than {self.most} solves are needed")
-                aspect = float(np.exp(_between(along, np.log(self.aspect_range))))
-                nu = float(np.clip(_between(across, self.nu_range), *self.nu_range))
+                aspect = float(np.exp(_value_at_place(along, np.log(self.aspect_range))))
+                nu = float(np.clip(_value_at_place(across, self.nu_range), *self.nu_range))
                 try:
                     found = self.solver(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
                 except ReferenceNotConvergedError as error:
@@ -202,14 +202,16 @@ class _Box:
         found_here = [self.solved[place] for place in places]
         return np.array([answers for answers, _ in found_here]), max(estimate for _, estimate in found_here)
 
-    def _compared(self, values: np.ndarray, checks: list[tuple[float, float]], estimate: float) -> float:
+    def _error_at_checks(self, values: np.ndarray, checks: list[tuple[float, float]], estimate: float) -> float:
         """Error estimate by solves at the checks, given that of the nodes."""
         if values[0].size == 1:
             return estimate
         solved, of_checks = self._solve(checks)
         places = np.array(checks).T
         along, across = map(lagrange_values, places, values.shape[1:])
-        differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _well_behaved(solved)).max(axis=1)
+        differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _interpolated_values(solved)).max(
+            axis=1
+        )
         if not differences[2:].max() <= LIMITS_TOLERANCE:
             raise self._failure(f"rotation and strain differ by {differences[2:].max():.1e} from those of solves")
         # Differences of logarithms are relative ones.
@@ -224,8 +226,8 @@ def _ends(ends: tuple[float, float]) -> str:
     return " to ".join(f"{end:.6g}" for end in ends)
 
 
-def _well_behaved(answers: np.ndarray) -> np.ndarray:
-    """What is interpolated, shape (4, n), of answers in the order of `ANSWER_NAMES`, shape (n, 4)."""
+def _interpolated_values(answers: np.ndarray) -> np.ndarray:
+    """Return the interpolated logarithms (4, n) of answers (n, 4) in the order of `ANSWER_NAMES`."""
     displacement, mean, rotation, strain = answers.T
     return np.stack([np.log(displacement), np.log(mean), np.log1p(rotation / strain), np.log(strain)])
 
@@ -254,7 +256,7 @@ def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
     return found / found.sum(axis=1, keepdims=True)
 
 
-def _promised(values: np.ndarray) -> float:
+def _expected_error(values: np.ndarray) -> float:
     """Return the interpolation error expected from the decay of Chebyshev coefficients along the second axis.
 
     Coefficients are taken in pairs, since every other one of an even function is zero. The last pair's ratio to the
@@ -277,7 +279,7 @@ def _place(values: np.ndarray, ends: ArrayLike) -> np.ndarray:
     return np.where(np.abs(values - first) <= BOX_TOLERANCE * max(1.0, abs(first)), 0.0, np.inf)
 
 
-def _between(place: float, ends: ArrayLike) -> float:
+def _value_at_place(place: float, ends: ArrayLike) -> float:
     """Inverse of `_place`."""
     first, last = np.asarray(ends, float)
     return float((first + last) / 2 + place * (last - first) / 2)

@@ -143,7 +143,7 @@ def solve_shape(
         if len(values) < 3:
             continue
         complaint = ""
-        problem.look_at_reactions(level)
+        problem.note_reactions(level)
         for name in names + ([] if problem.infinite_energy else [""]):
             kind = problem.kinds[name]
             scale = max(abs(values[-1][name]), NEGLIGIBLE_SHARE * level.scale(kind)) or 1.0
@@ -155,7 +155,7 @@ def solve_shape(
                 estimates[name] += 2 * float(np.abs(np.diff(of_full[-3:])).max()) / scale
                 accepted = max(accepted, KEPT_DEGREE_FACTOR * tolerance)
             bounds[name] = estimates[name] * scale
-            why = unmet(estimates[name], accepted, before, last)
+            why = refusal_reason(estimates[name], accepted, before, last)
             if why and not complaint:
                 shown = repr(name) if name else "the energy"
                 at = f"{estimates[name]:.1e} at degree {degree} ({level.unknowns} unknowns)"
@@ -204,18 +204,18 @@ def solve_each(
     return found, lacking
 
 
-def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
+def refusal_reason(estimate: float, accepted: float, before: float, last: float) -> str:
     """Return why an error estimate is refused, or an empty string; `before` and `last` are the last two steps.
 
     All are relative, over the same [1].
 
     Examples
     --------
-    >>> unmet(1e-4, 1e-5, 3e-4, 1e-4)
+    >>> refusal_reason(1e-4, 1e-5, 3e-4, 1e-4)
     'the tolerance is 1.0e-05'
-    >>> unmet(1e-5, 1e-4, 1.5e-5, 1e-5)
+    >>> refusal_reason(1e-5, 1e-4, 1.5e-5, 1e-5)
     'within the tolerance of 1.0e-04, but it is no bound: steps do not halve yet, 1.5e-05 and then 1.0e-05'
-    >>> unmet(1e-5, 1e-4, 4e-5, 1e-5)
+    >>> refusal_reason(1e-5, 1e-4, 4e-5, 1e-5)
     ''
     """
     if not estimate <= accepted:
@@ -227,7 +227,7 @@ def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
 
 
 class Problem:
-    """What all levels share: coarse triangles, stiffnesses, supports and loads by group, corners."""
+    """Data that all levels share: coarse triangles, stiffnesses, supports and loads by group, corners."""
 
     def __init__(
         self,
@@ -248,16 +248,16 @@ class Problem:
         corners = {name: tuple(self.points[name]) for name in sorted(used | probed)}
         for halvings in range(5):
             self.mesh = outline_mesh(shape, grouped, corners, LARGEST_TURN / 2**halvings)
-            self._look_at_corners(materials, used, probed)
+            self._find_corners(materials, used, probed)
             graded = [self._graded.copy() for _ in range(LAYERS_CHECKED)]
             for layers, mesh in enumerate(graded):
                 for _ in range(layers):
                     mesh.grade(self.rough)
-            if all(_unfolded(mesh) for mesh in (self.mesh, *graded)):
+            if all(_is_unfolded(mesh) for mesh in (self.mesh, *graded)):
                 return
         raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
 
-    def _look_at_corners(self, materials: Mapping[str, AnyMaterial], used: set[str], probed: set[str]) -> None:
+    def _find_corners(self, materials: Mapping[str, AnyMaterial], used: set[str], probed: set[str]) -> None:
         """Check materials, groups and quantities on the mesh, and find its corners."""
         load = self.load
         present = [self.mesh.names[part] for part in np.unique(self.mesh.parts)]
@@ -345,7 +345,7 @@ class Problem:
             points = ", ".join(sorted(self.loaded_points))
             raise ValueError(f"quantity {name!r}: {why}: spread the force on {points} over a side")
 
-    def look_at_reactions(self, level: "Level") -> None:
+    def note_reactions(self, level: "Level") -> None:
         """Note point supports that carry a force: a continuum's displacements and energy are infinite there."""
         least = SMALLEST_REACTION * level.scale("reaction")
         held = [support.group for support in self.load.supports if support.group in self.points]
@@ -383,7 +383,7 @@ class Problem:
         return len(self._graded.triangles) * ((degree + 1) * (degree + 2)) ** 2
 
 
-def _unfolded(mesh: CoarseMesh) -> bool:
+def _is_unfolded(mesh: CoarseMesh) -> bool:
     """Whether all triangles are the right way round everywhere."""
     if not (signed_areas(mesh.points, mesh.triangles) > 0).all():
         return False
@@ -578,7 +578,7 @@ class Level:
         return total
 
     def supports(self) -> tuple[np.ndarray, np.ndarray]:
-        """What is held, and the coefficients that are prescribed, shape (n_functions, 2)."""
+        """Return held directions and prescribed coefficients, shape (n_functions, 2)."""
         problem, space = self.problem, self.space
         held, values = np.zeros((space.n_functions, 2), dtype=bool), np.zeros((space.n_functions, 2))
         for support in problem.load.supports:
@@ -725,7 +725,7 @@ class Level:
         slopes = slopes @ inverse_of(jacobian, determinant)
         return most_rotation_and_strain(slopes.reshape(-1, 2, 2), (weights * np.abs(determinant)).ravel())
 
-    def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Triangles of points, and their reference coordinates there."""
         space = self.space
         corners = space.mesh.points[space.corners]
@@ -773,7 +773,7 @@ class Level:
         """Values at points, some thousand at a time: what locates them takes memory."""
         points = np.asarray(points, dtype=float)
         chunks = np.array_split(points, max(1, len(points) // 4000))
-        return np.concatenate([value(*self._located(chunk)) for chunk in chunks])
+        return np.concatenate([value(*self._locate(chunk)) for chunk in chunks])
 
     def _displacements(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Displacements in triangles at reference coordinates [m], shape (n, 2)."""

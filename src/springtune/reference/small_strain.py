@@ -55,7 +55,7 @@ MOST_CORRECTIONS = 40
 #: Error of a displacement from the twelve digits of a unit problem's aspect ratio, at most its third power, relative.
 ASPECT_ROUNDING = 2e-12
 
-#: Largest ratio of the sides of a body that bends, see `_most_slender`. Beyond some ratio the corrections do not
+#: Largest ratio of the sides of a body that bends, see `_largest_ratio`. Beyond some ratio the corrections do not
 #: converge; which one depends on the processor's arithmetic. On all that were tried it is at least 15 % above this one.
 MOST_BENT_RATIO = 7000.0
 
@@ -153,10 +153,10 @@ def solve_unit(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float 
 
 def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) -> tuple["UnitLevel", float]:
     """First level whose error estimate meets the tolerance, and the estimate."""
-    values, middle, slenderness = [], 0.0, _bent(aspect_ratio, kind)
+    values, middle, slenderness = [], 0.0, _bending_ratio(aspect_ratio, kind)
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
         where = f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative"
-        if slenderness > (most := _most_slender(nu, degree)) * (1 + 1e-9):  # the ratio is rounded
+        if slenderness > (most := _largest_ratio(nu, degree)) * (1 + 1e-9):  # the ratio is rounded
             why = f"is unknown at level {degree} if a body that bends has sides of more than {most:.0f} : 1"
             raise ReferenceNotConvergedError(f"{where} rounding error {why}; {SLENDER_REASON}")
         level = UnitLevel(2 * aspect_ratio, nu, degree, kind)  # in half heights
@@ -177,14 +177,14 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
     raise ReferenceNotConvergedError(f"{where} {missed}, the tolerance is {tolerance:.1e}")
 
 
-def _bent(aspect_ratio: float, kind: LoadKind) -> float:
+def _bending_ratio(aspect_ratio: float, kind: LoadKind) -> float:
     """Ratio of the side that bends to the side that the force is along; 0 if such a side is held against the force."""
     if any(side.axis == kind.axis and kind.axis in axes for side, axes in kind.held):
         return 0.0
     return aspect_ratio if kind.axis == 1 else 1 / aspect_ratio
 
 
-def _most_slender(nu: float, degree: int) -> float:
+def _largest_ratio(nu: float, degree: int) -> float:
     """Return the largest ratio of sides that a level can solve.
 
     Small elements, and stiff shear as nu tends to -1, worsen the condition of the matrix too.
@@ -244,7 +244,7 @@ class _Grid:
     def __init__(self, length: float, degree: int, kind: LoadKind) -> None:
         self._length, self._kind = length, kind
         self._x, self._y = (_Line(points, degree) for points in _element_ends(length, degree, kind))
-        self._unknowns = self._free()
+        self._unknowns = self._free_unknowns()
         self._direct, self._lateral, self._shear = self._matrices()
         self._split = len(self._unknowns[0][0]) * len(self._unknowns[0][1])
         # Along x and along y factors of the integrals over the loaded side of what moves along the force.
@@ -259,8 +259,8 @@ class _Grid:
             loaded[kind.along] = numbers[kind.along] == (line.last if kind.cut.far else line.first)
             self.middle = self._along_force(np.kron(*loaded)).astype(float)
 
-    def _free(self) -> list[list[np.ndarray]]:
-        """Of u_x and of u_y the unknowns along x and along y: what clamps, rollers and symmetry leave."""
+    def _free_unknowns(self) -> list[list[np.ndarray]]:
+        """Unknowns of u_x and of u_y along x and along y, without clamps, rollers and symmetry."""
         ends = {LEFT: self._x.first, RIGHT: self._x.last, BOTTOM: self._y.first, TOP: self._y.last}
         lines = self._x, self._y
         held = [[[ends[side] for side, axes in self._kind.half_held if side.axis == across and axis in axes]
@@ -275,7 +275,7 @@ class _Grid:
         return np.concatenate([first, second])
 
     def _matrices(self) -> tuple[csc_array, csc_array, csc_array]:
-        """Of the stiffness matrix the parts by direct strains, by lateral contraction and by shear."""
+        """Parts of the stiffness matrix: direct strains, lateral contraction, shear."""
         (first, second), x, y = self._unknowns, self._x, self._y
 
         def product(of_x: np.ndarray, of_y: np.ndarray, rows: list[np.ndarray], columns: list[np.ndarray]) -> coo_array:

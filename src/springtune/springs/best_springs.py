@@ -118,7 +118,7 @@ class LoadSpace:
         return network, factor
 
     def misses(self, stiffness: np.ndarray, slope: bool = False) -> tuple[np.ndarray, ...]:
-        """What energies, stretches and displacements miss, and with `slope` the gradient of the sum of their squares.
+        """Return the misfits of energies, stretches and displacements; with `slope` also the gradient of their squares' sum.
 
         Raises SingularError where the network is unstable.
         """

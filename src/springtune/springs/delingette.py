@@ -80,7 +80,7 @@ def _isotropic(mesh: Mesh, material: Material) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _anisotropic(mesh: Mesh, material: AnyMaterial) -> tuple[np.ndarray, np.ndarray]:
-    """As `_isotropic`, of any material, over the largest of its constants."""
+    """Return the coefficients of any material over the largest of its constants."""
     here = mesh.points[mesh.triangles]
     sides = np.roll(here, 1, axis=1) - np.roll(here, -1, axis=1)  # opposite each corner
     x, y = sides[..., 1], -sides[..., 0]
