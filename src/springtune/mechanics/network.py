@@ -4,8 +4,8 @@ A spring of stiffness k_e and rest length L_e, with distance vector d and length
 l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
 
 Scaling: a network has relative stiffnesses, each spring's over one reference stiffness k [N/m]. Forces are computed
-over k, so their unit is m, and energies over k in m2; ``s = F / k`` is the load. One solution in s serves all forces and
-reference stiffnesses of equal F/k. Multiply a force or an energy by k to have it in N or J.
+over k, so their unit is m, and energies over k in m2; ``s = F / k`` is the load. One solution in s serves all forces
+and reference stiffnesses of equal F/k. Multiply a force or an energy by k to have it in N or J.
 
 A network may have energies besides its springs, see `springtune.mechanics.energies`.
 """

@@ -118,7 +118,7 @@ class LoadSpace:
         return network, factor
 
     def misses(self, stiffness: np.ndarray, slope: bool = False) -> tuple[np.ndarray, ...]:
-        """Return the misfits of energies, stretches and displacements; with `slope` also the gradient of their squares' sum.
+        """Return misfits of energies, stretches and displacements; with `slope` the gradient of their squares.
 
         Raises SingularError where the network is unstable.
         """
