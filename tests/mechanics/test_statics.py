@@ -67,7 +67,7 @@ def test_an_arch_carries_its_closed_form_and_no_more(stiffness, beyond):
     assert f"beyond {100 * found.load_share:.3g} % of the load" in found.reason
     status, message, pivots = problem.judge(s, found)
     assert status is Status.UNSTABLE and np.isnan(pivots)
-    assert f"turns back, unstable, at {100 * found.limit_share:.3g} % of the load" in message
+    assert f"turns back and becomes unstable at {100 * found.limit_share:.3g} % of the load" in message
 
 
 class Starts(StaticProblem):
@@ -235,17 +235,22 @@ FLAWS = {
     "unstable beyond the load": ({"unstable_share": 1.2}, Status.SOLVED, "", 0),
     "limit at the load": ({"limit_share": 1.0}, Status.SOLVED, "", 0),
     "unstable at the load": ({"unstable_share": 1.0}, Status.SOLVED, "", 0),
-    "limit": ({"limit_share": 0.123}, Status.UNSTABLE, "turns back, unstable, at 12.3 % of the load", np.nan),
+    "limit": ({"limit_share": 0.123}, Status.UNSTABLE, "turns back and becomes unstable at 12.3 % of the load", np.nan),
     "no equilibrium": (
         {"converged": False, "reason": "no luck"},
         Status.NOT_CONVERGED,
         "no luck; last residual",
         np.nan,
     ),
-    "one pivot": ({"factor": SimpleNamespace(negative_pivots=1)}, Status.UNSTABLE, "has 1 negative pivot", 1),
-    "two pivots": ({"factor": SimpleNamespace(negative_pivots=2)}, Status.UNSTABLE, "has 2 negative pivots", 2),
+    "one pivot": ({"factor": SimpleNamespace(negative_pivots=1)}, Status.UNSTABLE, "(1 negative pivot)", 1),
+    "two pivots": ({"factor": SimpleNamespace(negative_pivots=2)}, Status.UNSTABLE, "(2 negative pivots)", 2),
     "singular": ({"factor": Singular()}, Status.UNSTABLE, "limit point: the tangent is singular", np.nan),
-    "path": ({"unstable_share": 0.25}, Status.UNSTABLE, "the path to it is unstable at 25 % of the load", 0),
+    "path": (
+        {"unstable_share": 0.25},
+        Status.UNSTABLE,
+        "the path to this equilibrium is unstable at 25 % of the load",
+        0,
+    ),
 }
 
 
@@ -255,5 +260,4 @@ def test_an_equilibrium_is_worth_what_its_flaws_leave(changes, status, message, 
     found = replace(problem.nonlinear(s), **changes)
     got, told, pivots = problem.judge(s, found)
     assert got is status and (message in told if message else not told)
-    assert told.endswith("pivots") == ("pivots" in message)
     np.testing.assert_equal(pivots, negative)

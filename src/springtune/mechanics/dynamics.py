@@ -318,9 +318,9 @@ class Motion(Moving):
         if not pivots:
             why = StaticProblem(network, self.load).departure(1.0, displacements)
             return "rest", f"at rest where a load that grows slowly does not lead: {why}" if why else ""
-        why = f"the tangent has {pivots} negative pivot{'s' * (pivots > 1)}, and the least push would end it"
+        why = f"{pivots} negative pivot{'s' * (pivots > 1)}: the least push would end it"
         remedy = "push the body sideways, by a force of a thousandth of the load, say, and run again"
-        return "unstable", f"at rest on an unstable equilibrium: {why}; {remedy}"
+        return "unstable", f"at rest on an unstable equilibrium ({why}); {remedy}"
 
 
 def _largest(matrix: sparray, start: np.ndarray | None = None) -> tuple[float, np.ndarray]:

@@ -105,12 +105,12 @@ class StaticProblem(LoadedNetwork):
         share = f"{100 * found.unstable_share:.3g} %"
         if found.limit_share < 1 and not found.unstable_share < found.limit_share:
             at = f"{100 * found.limit_share:.3g} % of the load"
-            said = f"limit point: the path from rest turns back, unstable, at {at}"
+            message = f"limit point: the path from rest turns back and becomes unstable at {at}"
             if found.snapped:
-                said += "; behind the snap it comes to a stable equilibrium that carries the load"
-            return Status.UNSTABLE, said, np.nan
+                message += "; after a snap the body reaches a stable equilibrium that carries the load"
+            return Status.UNSTABLE, message, np.nan
         if found.unstable_share < 1 and not found.converged:
-            return Status.UNSTABLE, f"the path from rest is unstable at {share} of the load: the body leaves it", np.nan
+            return Status.UNSTABLE, f"buckled: the path from rest is unstable at {share} of the load", np.nan
         if not found.converged:
             return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
         assert found.factor is not None  # of what converged
@@ -118,13 +118,13 @@ class StaticProblem(LoadedNetwork):
             pivots, flutters = self.stability(s, found.displacements, found.factor)
         except SingularError:
             return Status.UNSTABLE, "limit point: the tangent is singular", np.nan
-        why = "it flutters, two modes have merged into a complex pair" if flutters else ""
         if pivots:
-            why = f"the tangent has {pivots} negative pivot{'s' if pivots > 1 else ''}"
-        if why:
-            return Status.UNSTABLE, f"unstable equilibrium: {why}", pivots
+            counted = f"{pivots} negative pivot{'s' if pivots > 1 else ''}"
+            return Status.UNSTABLE, f"buckled: this equilibrium is unstable ({counted})", pivots
+        if flutters:
+            return Status.UNSTABLE, "it flutters: two modes have merged into a complex pair", pivots
         if found.unstable_share < 1:
-            return Status.UNSTABLE, f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
+            return Status.UNSTABLE, f"buckled: the path to this equilibrium is unstable at {share} of the load", pivots
         objections = (energy.objection(found.displacements) for energy in self.network.energies)
         return Status.SOLVED, "; ".join(filter(None, objections)), pivots
 
