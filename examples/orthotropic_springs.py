@@ -9,7 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import springtune as st
-from springtune.mechanics.moduli import affine_stiffness
+from springtune.mechanics.moduli import unit_fields, work_of
+from springtune.mechanics.network import Network
 from springtune.mesh import braced, lattice
 from springtune.springs import DefinitionError
 
@@ -29,10 +30,12 @@ def error(mesh, material):
         springs = FIT.springs(mesh, material, 1.0)
     except DefinitionError:
         return np.nan
-    network = affine_stiffness(mesh, springs) * springs.reference
+    network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative)
+    fields = unit_fields(mesh)
+    stiffness = work_of(fields, [network.linear_forces(field) for field in fields], mesh) * springs.reference
     values, vectors = np.linalg.eigh(material.plane_stress)
     root = vectors / np.sqrt(values)
-    return np.abs(np.linalg.eigvalsh(root.T @ network @ root) - 1).max()
+    return np.abs(np.linalg.eigvalsh(root.T @ stiffness @ root) - 1).max()
 
 
 def sheet(ratio, cauchy):
