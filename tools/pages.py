@@ -193,7 +193,7 @@ def _of_engine(runs: xr.Dataset) -> list[str]:
     work = (runs.substeps * runs.iterations).transpose(*SETTING)
     good = work.where(abs(runs.solver_error.transpose(*SETTING)) <= GOOD)
     if not good.notnull().any():
-        return [*cells, "none tried"]
+        return [*cells, "not reached"]
     best = good.isel(good.argmin(...))
     setting = f"{best.substeps.item()} x {best.iterations.item()}" if len(tried) > 1 else f"{best.substeps.item()}"
     return [*cells, setting]

@@ -4,8 +4,8 @@ A study's YAML file is read in `common.smk`. Its tasks are in `tasks/`, one file
 `springtune.studies.runs.job` does them. Results are stored by key in HDF5 files, many in one, so Snakemake sees the
 record of a job in `done/` alone. `digest` changes with all that a job's results depend on: parameters, code, packages.
 
-All stages run as `mesh` does: `{stage,solve}` is a wildcard of one value, which all else of the rule `mesh` takes. Those
-that need `mesh_{bundle}` share its bundles (`Stage.like`), and of `done("reference")` they need all jobs.
+All rules inherit params, log and command from `mesh`. The wildcard `stage` of a rule can only be its own name. Rules
+that read `mesh_{bundle}` share its bundles (`Stage.like`); of `done("reference")` they need all jobs.
 """
 
 

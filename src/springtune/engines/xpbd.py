@@ -3,7 +3,7 @@
 A spring is the constraint ``C = l - L`` with compliance ``1 / k``. An iteration visits the constraints one after the
 other; each changes its multiplier by ``(-C - a lambda) / (sum of w |grad C|^2 + a)`` with ``a = 1 / (k h^2)``.
 Multipliers begin each step at zero. Few iterations of small steps are better than many of large ones (Macklin et al.,
-Small steps in physics simulation, SCA 2019). Read: both papers' methods as they are described in later ones.
+Small steps in physics simulation, SCA 2019). The method follows later descriptions; these two papers were not read.
 
 Areas, squared lengths and rubber are blocks of constraints of a cell, solved at once; `springtune.handover.xpbd` has
 their formulas, which are exact for each energy. The volume of compressible rubber is found before each projection.
@@ -143,7 +143,7 @@ class ExtendedPositionBased(Textbook):
         self.compliance = (1 / (self.stiffness * self.h**2)).astype(self.kind)
 
     def _group(self, one: Blocks) -> tuple[Any, ...]:
-        """Arrays of a kind of blocks, as `_cells` takes them."""
+        """Arrays of a kind of blocks, as `_project_cells` takes them."""
         values = one.values
         rest = values["rest_length"] ** 2 if "rest_length" in values else values["rest_area"][:, None]
         law = values.get("stiffening", np.zeros((0, 2)))

@@ -1,4 +1,4 @@
-"""One scalar from one patch test of the very mesh: Young's modulus exact on any mesh, no reference solution.
+"""One scalar from one patch test of the same mesh: its mean Young's modulus is exact, no reference solution.
 
 ``k_e = s k_e,0`` with ``s = E / E_eff``, where E_eff is that of the network of `springtune.springs.lattice` (or of
 `springtune.springs.area`): one factorization of the mesh, scaled out of all later ones.
@@ -8,7 +8,7 @@ tested by three affine displacements of its whole outline, rims of holes include
 shape has an even strain. Their forces are a stiffness C, and with ``S = C^-1`` 1/E_eff is the mean over all
 directions of the strain along a unit pull, ``(3 S11 + 3 S22 + 2 S12 + S66) / 8``.
 
-It repairs what disorder costs in tension; bending, shear and nu stay those of the springs. Derived here.
+It corrects the tensile error of irregular meshes. Errors in bending, shear and nu remain. Derived here.
 """
 
 from dataclasses import replace
@@ -21,7 +21,7 @@ from .base import Springs, definition
 
 @definition("patch", order=190, cost=1)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not.
+    """Springs of `lattice` scaled once by a patch test of the mesh itself: its mean E is exact, nu is not.
 
     Source: own rule (derived).
     """

@@ -1,13 +1,14 @@
-r"""Springs fitted, none negative, to patch tests under even, linear, quadratic and cubic stresses; no reference.
+r"""Springs fitted, none negative, to patch tests under constant, linear, quadratic and cubic stresses; no reference.
 
 A sheet under no body force, whatever its outline and its holes, has displacements in closed form for polynomial
-stresses (Kolosov and Muskhelishov): with z = x + i y and analytic phi, psi
+stresses (Kolosov's formulas: N. Muskhelishvili, Some basic problems of the mathematical theory of elasticity, 1953):
+with z = x + i y and analytic phi, psi
 
 .. math:: 2 \mu (u + i v) = \kappa \varphi - z \overline{\varphi'} - \overline{\psi}, \qquad
           \sigma_{xx} + \sigma_{yy} = 4 \, \mathrm{Re} \, \varphi', \qquad
           \sigma_{yy} - \sigma_{xx} + 2 i \sigma_{xy} = 2 (\bar z \varphi'' + \psi'),
 
-kappa = (3 - nu) / (1 + nu), mu = E / (2 (1 + nu)). phi and psi = z^m, i z^m for m = 1 to 4 give 15 tests: 3 of even
+kappa = (3 - nu) / (1 + nu), mu = E / (2 (1 + nu)). phi and psi = z^m, i z^m for m = 1 to 4 give 15 tests: 3 of constant
 stress (tension, shear), 4 of linear (bending), 4 of quadratic (shear forces), 4 of cubic stress. They are combined so
 that the sheet's energies ``G_ab = integral of t_a . u_b along the outline`` are the unit matrix.
 

@@ -108,7 +108,7 @@ def rerun_reason(job: Job) -> str:
     if not job.record.exists():
         return "not done yet"
     if read_note(job.record).get("digest") != job.digest:
-        return "something else is asked for"
+        return "its parameters, code or packages changed"
     for product in job.products:
         if not Path(product).exists():
             return f"{product}{MISSING}"
