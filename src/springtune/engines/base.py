@@ -125,7 +125,7 @@ class Setting:
 
 
 class Session(Protocol):
-    """A net in an engine, at rest and without load displacements at first."""
+    """Simulation of a net in an engine; it starts at rest and undeformed."""
 
     def advance(self, frames: int) -> None:
         """Take a number of frames."""

@@ -145,7 +145,7 @@ class SpringNet(Tabled, Net):
         springs : Springs, optional
             In the place of the scene's own.
         errors : bool, optional
-            Whether the header shall say the expected errors, which takes a solve a load; of a shape those of its
+            Whether to compute the expected errors for the header, one solve per load; of a shape those of its
             quantities under the scene's load, for which its reference is solved.
 
         Returns
@@ -210,7 +210,7 @@ class SpringNet(Tabled, Net):
         mesh_name, errors : optional
             As of `from_scene`.
         loads : iterable of str, optional
-            Loads whose expected errors the header says; traction, bending and shear without.
+            Loads whose expected errors the header states; by default traction, bending and shear.
 
         Returns
         -------

@@ -37,7 +37,7 @@ Up to `NO_CHOLESKY_FROM_UNKNOWNS` SuperLU does, without CHOLMOD or with an unsym
 """
 
 PINS_FROM_UNKNOWNS = 5_000
-"""Unknowns above which an indefinite matrix gets a Cholesky factor with pins; SuperLU is as fast on smaller ones."""
+"""Unknowns above which an indefinite matrix gets a `PinnedFactor` by Cholesky's method; SuperLU is as fast on smaller ones."""
 
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
@@ -430,7 +430,7 @@ class Network:
         return self.solver == "multigrid" or self.solver is None and self.unknowns > MULTIGRID_FROM_UNKNOWNS
 
     def is_stable(self, displacements: np.ndarray, follower: tuple[float, FollowerPressure] | None = None) -> bool:
-        """Return whether the tangent's symmetric part is positive definite; cheaper than a factorization for use."""
+        """Return whether the tangent's symmetric part is positive definite; cheaper than `factorize_tangent`."""
         if follower is not None:
             follower = follower[0], follower[1].symmetric
         if self._by_cholesky:

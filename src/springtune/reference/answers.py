@@ -1,4 +1,4 @@
-r"""What is done with the answer of a reference without its finite elements: field, limits, scales.
+r"""Post-processing of references: fields, limits of small strain, scales of unit problems.
 
 A cantilever under a dead end load is the elastica :math:`\theta'' = -\alpha \cos\theta`, :math:`\alpha = F L^2 / (E
 I)`. Its end deflects by :math:`4/35\,\alpha^2` less than in small strain, where it turns by :math:`\alpha/2`;

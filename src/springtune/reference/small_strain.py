@@ -98,7 +98,7 @@ class ReferenceSolution(BeamField):
 def solve_small_strain(
     beam: Beam, material: Material, force: float, tolerance: float = 1e-4, kind: LoadKind = AXIAL
 ) -> ReferenceSolution:
-    r"""Solve for the displacements of a beam under a load.
+    r"""Solve a beam under a load by hp finite elements at small strain.
 
     `force` [N] is spread evenly over the loaded side, axial tension positive; -1 < nu <= 0.5. `tolerance` is the
     largest accepted relative error estimate [1].
@@ -111,7 +111,7 @@ def solve_small_strain(
     levels are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and the error is the sum of
     all later steps :math:`d_p = J_p - J_{p-1}`. These fall geometrically: with :math:`u \sim r^\lambda` at a corner
     one more layer scales the missing energy of the innermost element by :math:`.2^{2\lambda}`, and one more degree
-    that of the others similarly. For a clamped edge that meets a free one at a right angle (Williams 1952)
+    that of the others similarly. For a clamped edge that meets a free one at a right angle (M. Williams, J. Appl. Mech. 19:526, 1952)
 
     .. math:: \sin^2(\lambda\pi/2) = \frac{4}{(3-\nu)(1+\nu)} - \frac{1+\nu}{3-\nu}\lambda^2,
 
@@ -268,7 +268,7 @@ class _Grid:
         return [[line.all[~np.isin(line.all, there)] for line, there in zip(lines, sides)] for sides in held]
 
     def _along_force(self, part: np.ndarray) -> np.ndarray:
-        """Values of all unknowns, of which those across the force are zero."""
+        """Values of all unknowns; those across the force are zero."""
         first = np.zeros(self._split, EXTENDED_DTYPE)
         second = np.zeros(len(self._unknowns[1][0]) * len(self._unknowns[1][1]), EXTENDED_DTYPE)
         (first, second)[self._kind.axis][:] = part

@@ -43,8 +43,10 @@ DIMENSIONS: dict[str, str | tuple[str, str]] = {
 class Group:
     """A group of a dataset.
 
-    `variables` maps names to (dimensions, units, long name, fill value), `dimensions` those of this group alone to long
-    name and unit. `flags` holds meanings by a variable's name or its last word, `further` more attributes by variable.
+    - `variables`: (dimensions, units, long name, fill value) by name;
+    - `dimensions`: long name and unit of dimensions of this group alone;
+    - `flags`: meanings by a variable's name, or its last word, as ``status``;
+    - `further`: more attributes by variable.
     """
 
     name: str

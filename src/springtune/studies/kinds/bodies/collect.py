@@ -189,6 +189,7 @@ def _scene_rows(study, folder, answers):
             result, labels = results[key], study.labels(scene)
             against = objections[*(labels[name] for name in names), scene.kinematics]
             message = _with_objection(result, result.get("message", ""), against)
+            # Names of the result that variables.csv declares, as `displacement`, become variables; others are left out.
             cells.append(result | labels | {"message": message, "solve_seconds": result["seconds"]})
             if LOADS[scene.load].kind.pressed:
                 faces.append(labels | {new: result[old] for old, new in FACE_VARIABLES.items() if old in result})

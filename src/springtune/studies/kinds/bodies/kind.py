@@ -31,7 +31,7 @@ def _check(config, problems):
 
 def _expand(config, declared):
     if not config.shape_grids:
-        return {"shapes": None}  # and not empty: a study with grids has this kind
+        return {"shapes": None}  # grids alone: an empty part would say that the study has no bodies
     from .shape_expand import expand
 
     return {"shapes": expand(config, declared)}

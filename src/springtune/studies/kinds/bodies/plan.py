@@ -233,7 +233,7 @@ def finite_problem(reference, kind):
 def scene_tasks(study):
     """Tasks of a study's scenes by mesh, in the order of `scenes_by_mesh`.
 
-    A task's key is of its scene; `stored.stored_key` is where its result is.
+    A task's key ignores the calibration; `stored.stored_key` adds the calibrated stiffness.
     """
     return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in scenes_by_mesh(study).items()}
 
