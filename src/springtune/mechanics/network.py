@@ -37,7 +37,7 @@ Up to `NO_CHOLESKY_FROM_UNKNOWNS` SuperLU does, without CHOLMOD or with an unsym
 """
 
 PINS_FROM_UNKNOWNS = 5_000
-"""Unknowns above which an indefinite matrix gets a `PinnedFactor` by Cholesky's method; SuperLU is as fast on smaller ones."""
+"""Unknowns above which an indefinite matrix gets a `PinnedFactor`; SuperLU is as fast on smaller ones."""
 
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:

@@ -111,7 +111,8 @@ def solve_small_strain(
     levels are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and the error is the sum of
     all later steps :math:`d_p = J_p - J_{p-1}`. These fall geometrically: with :math:`u \sim r^\lambda` at a corner
     one more layer scales the missing energy of the innermost element by :math:`.2^{2\lambda}`, and one more degree
-    that of the others similarly. For a clamped edge that meets a free one at a right angle (M. Williams, J. Appl. Mech. 19:526, 1952)
+    that of the others similarly. For a clamped edge that meets a free one at a right angle (M. Williams, J. Appl.
+    Mech. 19:526, 1952)
 
     .. math:: \sin^2(\lambda\pi/2) = \frac{4}{(3-\nu)(1+\nu)} - \frac{1+\nu}{3-\nu}\lambda^2,
 
