@@ -1,4 +1,4 @@
-"""The study, its jobs, what the rules share, and what comes before the first job and after the last one.
+"""The study and its jobs, functions that rules share, and the begin and end of a run.
 
 Reading a Snakefile writes nothing.
 """
@@ -24,7 +24,7 @@ from springtune.studies.runs import locks, rerun
 from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder
 
 BEGUN = time.time()
-"""Start of this run [s since the epoch]; newer files are its products."""
+"""Start of this run [s since the epoch]; its products are newer."""
 
 SOURCE = workflow_folder()
 IS_MODULE = "study" in config
@@ -66,13 +66,13 @@ def chosen_study():
 
 
 def refused(why):
-    """End before anything runs, with a message and no traceback through Snakemake."""
+    """Print a message and exit, without a traceback through Snakemake."""
     print(why, file=sys.stderr)
     sys.exit(1)
 
 
 def loaded_study():
-    """The study of CONFIG, in a folder of results that is its own."""
+    """Load the study of CONFIG; its folder of results must be its own."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("once", AssumptionWarning)
@@ -85,7 +85,7 @@ def loaded_study():
 
 
 CONFIG = chosen_study()
-# Scenes and their tasks stay to the end: collecting garbage among them takes a fifth of the reading.
+# Scenes and tasks stay until the end: collecting garbage among them takes a fifth of the time.
 gc.disable()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
@@ -100,7 +100,7 @@ if not IS_MODULE:
     config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 
 
-# What rules take.
+# Functions that rules use.
 
 
 def done(stage):
@@ -114,12 +114,12 @@ def bundles():
 
 
 def digest(wildcards):
-    """Parameter of a job that changes with all that its results depend on."""
+    """Digest of a job: it changes with everything that its results depend on."""
     return JOBS[f"{wildcards.stage}_{wildcards.bundle}"].digest
 
 
 def study(wildcards):
-    """Path of the study; of a function Snakemake takes braces as they are."""
+    """Path of the study, as a function, so that Snakemake does not expand braces in it."""
     return str(CONFIG)
 
 

@@ -3,7 +3,7 @@
 MADE = rerun.output_jobs(STUDY)
 FIGURES_AND_TABLES = {job: [path for one in made for path in in_report(one)] for job, made in MADE.items()}
 
-for job, made in MADE.items():  # those that share a job share what it reads
+for job, made in MADE.items():  # outputs of one job share the dataset that it reads
 
     rule:
         name:

@@ -1,4 +1,4 @@
-"""The paper: `snakemake paper` runs the studies that it reads, where they are missing or out of date, and sets it."""
+"""The paper: `snakemake paper` runs its studies if they are missing or outdated, and typesets it."""
 
 from springtune.studies.paper import PaperError, check_typst
 
