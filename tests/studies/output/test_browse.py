@@ -9,10 +9,14 @@ import h5netcdf
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from test_dataset import GROUPS
 
 import springtune
 from springtune.cli import main
-from springtune.studies.output.browse.page import packed, page
+from springtune.studies.config.kind import kinds
+from springtune.studies.kinds.collect import group_of
+from springtune.studies.kinds.samples.designs import PARAMETERS
+from springtune.studies.output.browse.page import packed, page, views
 
 from synthetic import dataset
 
@@ -85,31 +89,9 @@ class TestPage:
 
     def test_views_name_variables_that_studies_have(self):
         """A plot whose variable is misspelt would be left out silently."""
-        from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
-        from springtune.studies.kinds.bodies.variables import (
-            AT_FINITE_STRAIN,
-            BLOCK,
-            FIELDS,
-            FINITE_STRAIN,
-            ROOT,
-            SENSITIVITY,
-            SHAPE_FIELDS,
-            SHAPES,
-        )
-        from springtune.studies.kinds.collect import group_of
-        from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
-        from springtune.studies.kinds.laying.kind import KIND as LAYING
-        from springtune.studies.kinds.moduli.kind import KIND as MODULI
-        from springtune.studies.kinds.samples.collect import SAMPLES, SOBOL
-        from springtune.studies.kinds.samples.designs import PARAMETERS
-        from springtune.studies.kinds.stability.kind import KIND as STABILITY
-        from springtune.studies.output.browse.page import views
-
-        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, ENGINE_RUNS, ENGINE_CURVES)
-        groups += tuple(map(group_of, (MODULI, BENCHMARK, LAYING, STABILITY)))
-        groups += (SAMPLES, SOBOL, SHAPES, SHAPE_FIELDS, AT_FINITE_STRAIN)
+        of_rows = [group_of(kind) for kind in kinds() if kind.name in ("moduli", "benchmark", "laying", "stability")]
+        known = {group.name: group for group in (*GROUPS.values(), *of_rows)}
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
-        known = {group.name: group for group in groups}
         for view in views().values():
             variables = known[view.group].variables
             dimensions = {name for row in variables.values() for name in row[0]} | coordinates.get(view.group, set())
