@@ -1,7 +1,8 @@
 """From a study to its dataset: each job does a bundle of tasks, and solves those whose results are not stored.
 
 `common.smk` reads the study. The begin of a run writes the tasks of each job to `tasks/`; `springtune.studies.runs.job`
-solves them. HDF5 files store results by key, many in one file, so the output of a job is its record in `done/`. `digest` changes with all that a job's results depend on: parameters, code, packages.
+solves them. HDF5 files store results by key, many in one file, so the output of a job is its record in `done/`.
+`digest` changes with all that a job's results depend on: parameters, code, packages.
 
 All rules inherit params, log and command from `mesh`. The wildcard `stage` of a rule can only be its own name. Rules
 that read `mesh_{bundle}` share its bundles (`Stage.like`); of `done("reference")` they need all jobs.
