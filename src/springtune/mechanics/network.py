@@ -13,6 +13,7 @@ A network may have energies besides its springs, see `springtune.mechanics.energ
 import copy
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -318,6 +319,7 @@ class Network:
         NaN where there are no such springs.
         """
         outline, sizes = self.mesh.on_outline, self.stiffness
+        parts: dict[str, tuple[np.ndarray, Any]]
         parts = {"inside": (~outline, np.median), "outline": (outline, np.median)}
         parts |= {"least": (np.ones_like(outline), np.min), "most": (np.ones_like(outline), np.max)}
         return {name: float(of(sizes[part])) if part.any() else np.nan for name, (part, of) in parts.items()}

@@ -109,25 +109,9 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """Read a mesh of any format that meshio reads.
+    """Read a mesh of any format that meshio reads; `unit` is that of coordinates in the file [m].
 
-    Particles without cells are dropped, clockwise cells are turned.
-
-    Parameters
-    ----------
-    path : str or Path
-    unit : float, optional
-        Unit of the coordinates in the file [m].
-
-    Returns
-    -------
-    Mesh
-
-    Raises
-    ------
-    MeshError
-        If the file is unreadable or too large, has no linear triangles or quadrilaterals or other cells, cells with
-        missing points, points that are not finite or not in one plane, or cells without area.
+    Particles without cells are dropped, clockwise cells are turned. Cells must be linear, plane and not flat.
     """
     return _build_mesh(path, _file_content(path), unit)[0]
 
@@ -331,21 +315,8 @@ def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
     named arrays of zeros and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline,
     make sides; one point makes a point; triangles and quadrilaterals make a part, unless they are all cells.
 
-    Parameters
-    ----------
-    path : str or Path
-    unit : float, optional
-        Unit of the coordinates in the file [m].
-
-    Returns
-    -------
-    GroupedMesh
-        `unusable` says why groups of the file are not usable.
-
-    Raises
-    ------
-    MeshError
-        As `read_mesh`, and if the cells are not a conforming plane sheet.
+    `unit` is that of coordinates in the file [m]; `GroupedMesh.unusable` says why groups are not usable. The cells must
+    be a conforming plane sheet.
     """
     content = _file_content(path)
     mesh, used = _build_mesh(path, content, unit)

@@ -47,9 +47,9 @@ LEAST_QUANTITY, MOST_QUANTITY = 1e-40, 1e40
 """Quantities between which products of several stay numbers [SI units]; forces are what they are."""
 
 
-def beyond(number: float, kind: str) -> bool:
+def beyond(number: Number, kind: str) -> bool:
     """Whether a quantity is so small or large that nothing can be computed with it."""
-    return kind != "force" and not LEAST_QUANTITY <= number <= MOST_QUANTITY
+    return bool(kind != "force" and not LEAST_QUANTITY <= number <= MOST_QUANTITY)
 
 
 def _remedy(kind: str) -> str:

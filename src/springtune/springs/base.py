@@ -9,7 +9,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import LEAST_QUANTITY, MOST_QUANTITY
+from ..problem.quantities import beyond
 from ..registry import Declaration, Registry
 
 
@@ -192,9 +192,7 @@ class Definition(Declaration):
             )
         told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
         for name, value in told:
-            if isinstance(value, bool) or not (
-                isinstance(value, int | float | np.number) and LEAST_QUANTITY <= value <= MOST_QUANTITY
-            ):
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or beyond(value, name):
                 raise DefinitionError(f"{name}: {value!r} is not a number above zero; give one in SI units")
         if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
             raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
