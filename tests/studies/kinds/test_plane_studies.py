@@ -39,7 +39,7 @@ def gathered(tmp_path):
     def gather(text):
         study = campaigns.load_text(tmp_path, text)
         campaigns.do_stages(study, tmp_path)
-        return collect.gathered(study, tmp_path), provenance.attributes(study)
+        return collect.groups_of_study(study, tmp_path), provenance.attributes(study)
 
     return gather
 
