@@ -42,14 +42,14 @@ class ImplicitEuler:
         solver = BackwardEuler(setting.iterations, TOLERANCE)
         self.steps = make_stepper(motion, solver, setting.step, setting.precision or "float64")
         self.steps.begin(np.zeros_like(net.points), np.zeros_like(net.points))
-        self.substeps, self.kept = setting.substeps, 1 / (1 + damping * setting.step)
+        self.substeps, self.velocity_share = setting.substeps, 1 / (1 + damping * setting.step)
 
     def advance(self, frames: int) -> None:
         """Take a number of frames."""
         with np.errstate(all="ignore"):
             for _ in range(frames * self.substeps):
                 self.steps.advance(1)
-                self.steps.v = self.steps.v * self.kept
+                self.steps.v = self.steps.v * self.velocity_share
 
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""

@@ -69,14 +69,14 @@ class _Session:
         self.model.opt.iterations = setting.iterations
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data, self.step, self.moving = mujoco.MjData(self.model), mujoco.mj_step, ~net.held
-        self.substeps, self.kept = setting.substeps, 1 / (1 + damping * setting.step)
+        self.substeps, self.velocity_share = setting.substeps, 1 / (1 + damping * setting.step)
 
     def advance(self, frames: int) -> None:
         """Take a number of frames."""
         with _no_log():
             for _ in range(frames * self.substeps):
                 self.step(self.model, self.data)
-                self.data.qvel *= self.kept
+                self.data.qvel *= self.velocity_share
 
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""

@@ -71,7 +71,7 @@ class _Session:
             self.solver = getattr(newton.solvers, f"Solver{solver}")(self.model, iterations=setting.iterations)
             self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.step, self.substeps = setting.step, setting.substeps
-        self.kept = np.float32(1 / (1 + damping * setting.step))
+        self.velocity_share = np.float32(1 / (1 + damping * setting.step))
         singly = net.held & ~net.held.all(axis=1, keepdims=True)
         self.forces, self.guided = (np.pad(plane, ((0, 0), (0, 1))) for plane in (net.forces, singly))
         self.rest = self.now.particle_q.numpy().copy()
@@ -85,7 +85,7 @@ class _Session:
                 self.solver.step(self.now, self.next, self.control, None, self.step)
                 self.now, self.next = self.next, self.now
                 places, velocities = self.now.particle_q.numpy(), self.now.particle_qd.numpy()
-                velocities *= self.kept
+                velocities *= self.velocity_share
                 self.forces[self.guided] -= self.reacting * (places - self.rest)[self.guided]
                 places[self.guided], velocities[self.guided] = self.rest[self.guided], 0
 

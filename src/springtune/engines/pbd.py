@@ -43,7 +43,7 @@ class PositionBased(Textbook):
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         refuse_pushing_springs(net, "no share of a stretch is negative")
         super().__init__(net, setting, damping)
-        self.shares = shares(net, setting)[net.stiffness != 0].astype(self.kind)
+        self.shares = shares(net, setting)[net.stiffness != 0].astype(self.dtype)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions: no constraint is compliant."""

@@ -38,7 +38,7 @@ class Projective(Textbook):
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         refuse_pushing_springs(net, "the global step needs a positive one")
         super().__init__(net, setting, damping)
-        self.free = (~net.held).astype(self.kind)
+        self.free = (~net.held).astype(self.dtype)
         self.descent = np.empty_like(self.x, order="F")  # as the factors take it
         alike = np.array_equal(net.held[:, 0], net.held[:, 1])
         axes = [slice(0, 2)] if alike else [slice(0, 1), slice(1, 2)]
@@ -50,7 +50,7 @@ class Projective(Textbook):
         links = links + links.T
         whole = diags_array(self.inertia + links.sum(axis=1)) - links
         matrix = diags_array(free) @ whole @ diags_array(free) + diags_array(1 - free)
-        return splu(csc_array(matrix, dtype=self.kind), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, **SUPERLU)
+        return splu(csc_array(matrix, dtype=self.dtype), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, **SUPERLU)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Iterate from the inertial positions."""

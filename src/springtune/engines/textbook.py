@@ -57,18 +57,18 @@ class Textbook:
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         assert net.masses is not None  # of a scene that moves
-        kind = np.dtype(setting.precision or "float64")
-        self.kind, self.h = kind, kind.type(setting.step)
+        dtype = np.dtype(setting.precision or "float64")
+        self.dtype, self.h = dtype, dtype.type(setting.step)
         self.substeps, self.iterations = setting.substeps, setting.iterations
-        self.kept = kind.type(1 / (1 + damping * setting.step))
-        self.points = (net.points - net.points.mean(axis=0)).astype(kind)  # small numbers lose least by rounding
-        self.weights = np.where(net.held, 0, 1 / net.masses[:, None]).astype(kind)
-        self.push = (setting.step**2 * np.where(net.held, 0, net.forces / net.masses[:, None])).astype(kind)
-        self.inertia = (net.masses / setting.step**2).astype(kind)
+        self.velocity_share = dtype.type(1 / (1 + damping * setting.step))
+        self.points = (net.points - net.points.mean(axis=0)).astype(dtype)  # small numbers lose least by rounding
+        self.weights = np.where(net.held, 0, 1 / net.masses[:, None]).astype(dtype)
+        self.push = (setting.step**2 * np.where(net.held, 0, net.forces / net.masses[:, None])).astype(dtype)
+        self.inertia = (net.masses / setting.step**2).astype(dtype)
         self.x, self.v = self.points.copy(), np.zeros_like(self.points)
         there = net.stiffness != 0
         self.springs = net.springs[there]
-        self.lengths, self.stiffness = net.rest_lengths[there].astype(kind), net.stiffness[there].astype(kind)
+        self.lengths, self.stiffness = net.rest_lengths[there].astype(dtype), net.stiffness[there].astype(dtype)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Return the positions at the end of a step from the inertial ones, which it may change."""
@@ -80,7 +80,7 @@ class Textbook:
             for _ in range(frames * self.substeps):
                 before = self.x
                 self.x = self.solve(before + self.h * self.v + self.push)
-                self.v = self.kept / self.h * (self.x - before)
+                self.v = self.velocity_share / self.h * (self.x - before)
 
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""

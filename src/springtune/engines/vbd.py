@@ -115,7 +115,7 @@ class _Descent(Textbook):
         refuse_pushing_springs(net, "blocks need positive ones")
         super().__init__(net, setting, damping)
         self.last = self.v
-        self.sizes = np.maximum((self.push**2).sum(axis=1, keepdims=True), np.finfo(self.kind).tiny) / self.h
+        self.sizes = np.maximum((self.push**2).sum(axis=1, keepdims=True), np.finfo(self.dtype).tiny) / self.h
         given = {
             (one.kind, one.cells.shape[1]): (one.cells, *(one.values[name] for name in one.units))
             for one in net.energies
@@ -131,7 +131,7 @@ class _Descent(Textbook):
         """Places of each particle in cells, and the cells' values."""
         order = np.argsort(cells.ravel(), kind="stable")
         pointers = np.searchsorted(cells.ravel()[order], np.arange(len(self.x) + 1))
-        return pointers, order, np.ascontiguousarray(cells, np.int64), *(one.astype(self.kind) for one in values)
+        return pointers, order, np.ascontiguousarray(cells, np.int64), *(one.astype(self.dtype) for one in values)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Sweep from the guess."""

@@ -140,7 +140,7 @@ class ExtendedPositionBased(Textbook):
             self.groups = [self._group(one) for one in blocks(net)]
         except ValueError as error:
             raise EngineError(str(error)) from None
-        self.compliance = (1 / (self.stiffness * self.h**2)).astype(self.kind)
+        self.compliance = (1 / (self.stiffness * self.h**2)).astype(self.dtype)
 
     def _group(self, one: Blocks) -> tuple[Any, ...]:
         """Arrays of a kind of blocks, as `_project_cells` takes them."""
@@ -150,13 +150,13 @@ class ExtendedPositionBased(Textbook):
         if one.kind == "compressible":
             law = np.column_stack([values["shear"], values["bulk"]]) / values["bulk"][:, None]
         parts = rest, values.get("rest_slope", np.zeros((0, 3, 2))), law, one.compliance / float(self.h) ** 2
-        return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.kind) for part in parts)
+        return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.dtype) for part in parts)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions."""
         springs = self.weights, self.springs, self.lengths, np.ones_like(self.lengths), self.compliance
         pulls = np.zeros_like(self.lengths)
-        groups = [(*one, np.zeros(one[-1].shape[:2], self.kind)) for one in self.groups]
+        groups = [(*one, np.zeros(one[-1].shape[:2], self.dtype)) for one in self.groups]
         rounds, each = (self.iterations, 1) if groups else (1, self.iterations)
         for _ in range(rounds):
             project_springs(y, *springs, pulls, each)
