@@ -33,7 +33,7 @@ class Dimension:
 
     @property
     def words(self) -> str:
-        """What to give, for messages: ``a length such as '200 mm'``."""
+        """Example for messages: ``a length such as '200 mm'``."""
         return f"{_article(self.name)} such as '{self.example}'"
 
 

@@ -15,7 +15,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 from springtune.problem.geometry import AssumptionWarning
-from springtune.safe_io.atomic import remove_unfinished, to_present
+from springtune.safe_io.atomic import remove_unfinished, reset_future_times
 from springtune.safe_io.escapes import rst
 from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
@@ -163,7 +163,7 @@ def begin():
         for one, jobs in rerun.STUDIES_READ:
             folder = jobs["collect"].folder
             remove_unfinished(folder)
-            to_present(folder)  # Snakemake refuses products that are older than what they are made of
+            reset_future_times(folder)  # Snakemake refuses products that are older than what they are made of
             remove_unfinished(folder.parent, below=False)  # of what studies share
             locks.claim(folder, one.path)
             for job in jobs.values():

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import check_folder, replacing
-from ..safe_io.inputs import DataElsewhere, bounded, check_alone, fault
+from ..safe_io.inputs import DataElsewhere, bounded, check_alone, why_unreadable
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas
 from .groups import LINEAR_CELLS_REMEDY, OTHER_FILES_REASON, Block, Content, GroupedMesh, part_names
@@ -144,7 +144,7 @@ def _build_mesh(
 
 def _file_content(path: str | Path) -> Content:
     """Read a file; a MeshError gives the reason for a failure."""
-    if fault(path):
+    if why_unreadable(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     size, ending = Path(path).stat().st_size, Path(path).suffix.lower()
     if ending in REASONS_BY_ENDING:

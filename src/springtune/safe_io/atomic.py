@@ -17,7 +17,7 @@ ABANDONED_SECONDS = 3600.0
 
 
 def writer() -> str:
-    """Who writes, as names of files say it: the number of this process, at a machine, since others have it, too."""
+    """Process and machine for the name of an unfinished file: another machine may have the same process number."""
     return f"{os.getpid()}@{platform.node().replace('.', '-')}"
 
 
@@ -67,8 +67,8 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
                 path.unlink()
 
 
-def to_present(folder: str | Path) -> None:
-    """Give the present time to files of a folder from the future, as a clock that was set back leaves them."""
+def reset_future_times(folder: str | Path) -> None:
+    """Give files with a time in the future the present time; a clock that was set back leaves such files."""
     now = time.time()
     for path in Path(folder).rglob("*"):
         if path.is_file() and path.stat().st_mtime > now:
@@ -76,15 +76,15 @@ def to_present(folder: str | Path) -> None:
 
 
 def _is_being_written(path: Path) -> bool:
-    """Whether the process that writes an unfinished file lives, or may live."""
+    """Return whether the process that writes an unfinished file runs, or may run."""
     number, _, host = path.name.removesuffix(UNFINISHED_ENDING).rpartition(".")[2].partition("@")
     if host not in ("", writer().partition("@")[2]):
         return time.time() < path.stat().st_mtime + ABANDONED_SECONDS
-    return number.isdecimal() and lives(int(number))
+    return number.isdecimal() and is_running(int(number))
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write a file; folders are made where they are missing."""
+    """Write a file atomically; create missing folders."""
     with replacing(path) as unfinished:
         unfinished.write_bytes(content)
 
@@ -108,7 +108,7 @@ def write_json(path: str | Path, content: Any) -> None:
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
-def lives(pid: int) -> bool:
+def is_running(pid: int) -> bool:
     """Return whether a process runs."""
     import psutil  # here: hardly ever is there something to ask
 

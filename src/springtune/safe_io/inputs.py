@@ -26,19 +26,19 @@ class BeyondSize(ValueError):
 
 
 class DataElsewhere(ValueError):
-    """Data of a file are stored in another one, or behind a link."""
+    """A file has data in another file or behind a link."""
 
 
 class BeyondBound(MemoryError):
     """Reading a file takes more memory or time than it may."""
 
 
-def fault(path: str | Path) -> str:
-    """Return why a file is not opened: missing, or not a regular file, which may block or never end.
+def why_unreadable(path: str | Path) -> str:
+    """Return why a file cannot be read, or an empty string; pipes and devices may block or never end.
 
     Examples
     --------
-    >>> fault("nothing.csv"), fault("/"), fault("/dev/null")
+    >>> why_unreadable("nothing.csv"), why_unreadable("/"), why_unreadable("/dev/null")
     ('No such file or directory', 'Is a directory', 'a pipe or a device, not a file')
     """
     try:
@@ -51,8 +51,8 @@ def fault(path: str | Path) -> str:
 
 
 def read(path: str | Path, most: int) -> bytes:
-    """Content of a regular file."""
-    why = fault(path)
+    """Return the content of a regular file of at most so many bytes."""
+    why = why_unreadable(path)
     if not why:
         try:
             with open(path, "rb") as file:
@@ -76,7 +76,7 @@ THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
 def csv_rows(path: str | Path, refuse: Callable[[str], ValueError], remedy: str) -> Rows:
-    """Rows of a CSV file, the head first, without comments after #.
+    """Read the rows of a CSV file, the head first, without comments after #.
 
     Semicolons or tabs in the head separate its columns, else commas. Decimal commas become points.
     """
@@ -100,7 +100,7 @@ def csv_rows(path: str | Path, refuse: Callable[[str], ValueError], remedy: str)
 
 
 def _with_points(path: str | Path, rows: Rows, refuse: Callable[[str], ValueError]) -> Rows:
-    """Rows with decimal points for commas; refuse commas that may separate thousands."""
+    """Replace decimal commas by points; refuse commas that may separate thousands."""
     found = [cell.strip() for _, row in rows for cell in row if DECIMAL.fullmatch(cell.strip())]
     commas = [cell for cell in found if "," in cell]
     if not commas:
@@ -118,7 +118,7 @@ def _with_points(path: str | Path, rows: Rows, refuse: Callable[[str], ValueErro
 def numbers(
     path: str | Path, rows: Rows, names: Sequence[str], refuse: Callable[[str], ValueError]
 ) -> list[list[float]]:
-    """Numbers of rows below the names of their columns; those of columns without a name may be NaN."""
+    """Read the numbers of rows; a column without a name may have NaN."""
     found = []
     for line, row in rows:
         if len(row) != len(names):
@@ -141,7 +141,7 @@ def number_of(text: object) -> float:
 
 
 def virtual_memory() -> int:
-    """Bytes that this process has mapped; 0 where the system does not say."""
+    """Return the bytes that this process has mapped; 0 if the system does not tell."""
     try:
         with open("/proc/self/statm", "rb", buffering=0) as file:
             return int(file.read().split()[0]) * mmap.PAGESIZE
@@ -182,7 +182,7 @@ def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
 
 @contextmanager
 def _time_limit(seconds: float) -> Iterator[None]:
-    """Context that ends by BeyondBound after some seconds of the processor."""
+    """Context that raises BeyondBound after some seconds of processor time."""
     if not seconds or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield
         return

@@ -63,14 +63,14 @@ def _cell(tag: str, content: object) -> str:
 
 
 class Tabled:
-    """Object that is shown as rows of labels and texts: in a line by `repr`, as a table in print and in notebooks."""
+    """Object with rows of labels and texts: one line in `repr`, a table in `print` and in notebooks."""
 
     def _rows(self) -> Iterable[tuple[str, str]]:
-        """Labels and texts with units; empty texts are not shown."""
+        """Return labels and texts with units; rows with an empty text are hidden."""
         raise NotImplementedError
 
     def _computed_rows(self) -> Iterable[tuple[str, str]]:
-        """Further rows that take time, for tables alone."""
+        """Return rows that take time to compute; only tables show them."""
         return ()
 
     def _table(self) -> list[tuple[str, str]]:
@@ -90,10 +90,10 @@ One = TypeVar("One", bound=Tabled)
 
 
 class TabledList(list[One]):
-    """List that is shown as one table, a row each."""
+    """List whose objects are the rows of one table."""
 
     def table(self) -> list[list[str]]:
-        """Labels, then the texts of each object."""
+        """Return the labels, then the texts of each object."""
         rows = [dict(one._rows()) for one in self]
         labels = list(dict.fromkeys(label for row in rows for label in row))
         return [labels, *([row.get(label, "") for label in labels] for row in rows)]

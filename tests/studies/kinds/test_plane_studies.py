@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from springtune.studies.kinds import collect
-from springtune.studies.output.selection import of_own_law
+from springtune.studies.output.selection import select_own_law
 from springtune.studies.runs import provenance
 
 import campaigns
@@ -51,7 +51,7 @@ def test_a_material_in_plane_strain_is_compared_in_its_plane(gathered):
     assert root.material_plane.values.tolist() == ["strain", "stress", "strain"]
     np.testing.assert_array_equal(groups["/moduli"].poisson_ratio, [0.3, 1 / 3, 0.45 / 0.55])
     assert abs(groups["/moduli"].young_modulus_error.sel(definition="delingette")).max() < 1e-9
-    own = of_own_law(finite).reference_displacement.squeeze()
+    own = select_own_law(finite).reference_displacement.squeeze()
     np.testing.assert_allclose(own, root.reference_displacement.squeeze(), rtol=1e-3)
     asked = finite.sel(reference="neo-hooke-plane-stress", material="rock")
     assert "is in plane strain: its reference is 'neo-hooke-plane-strain'" in asked.reference_message.item()

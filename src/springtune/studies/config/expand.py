@@ -12,7 +12,7 @@ from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from springtune.problem.parameters import SWEPT
 from springtune.registry import NAME, NAME_RULE
-from springtune.safe_io.inputs import fault
+from springtune.safe_io.inputs import why_unreadable
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
@@ -72,7 +72,7 @@ def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Pr
         for number, row in enumerate(rows):
             path, label = problems.folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
-            if why := fault(path):
+            if why := why_unreadable(path):
                 problems.add((*where, "file"), f"'{path}': {why}; {FROM_THE_STUDY}")
             if label in found:
                 problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")

@@ -34,7 +34,7 @@ HIDDEN_ATTRIBUTES = {
     "Conventions",
     "references",
 }
-"""Attributes that are not told as they are."""
+"""Attributes that a comparison does not note."""
 
 Labels = dict[str, str | float]
 
@@ -141,7 +141,7 @@ def compare(
     ignored: Collection[str] = (),
     most: int | None = None,
 ) -> Comparison:
-    """Compare two datasets by label; of each variable so many changes are listed.
+    """Compare two datasets by label; list at most so many changes of each variable.
 
     Numeric labels match in nine digits; NaN equals NaN. Values of cells that one study does not request
     are not compared. Numbers inside texts are compared as numbers. `MEASURED_VARIABLES` is left out.
@@ -178,7 +178,7 @@ def compare(
 
 
 def _rounded(data: xr.Dataset) -> xr.Dataset:
-    """A dataset whose numeric labels have nine digits, so that those of two machines are the same."""
+    """Round numeric labels to nine digits, so that labels of two machines match."""
     for name, index in data.indexes.items():
         if not index.is_unique:
             raise ValueError(f"dimension '{name}' has the label {index[index.duplicated()][0]} twice; run it again")
@@ -188,13 +188,13 @@ def _rounded(data: xr.Dataset) -> xr.Dataset:
 
 
 def _names_of_one(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
-    """Names of each side that the other has not."""
+    """Names that only one side has, for each side."""
     one, other = sides
     return [name for name in one if name not in other], [name for name in other if name not in one]
 
 
 def _noted_attributes(attributes: Mapping[Hashable, object]) -> dict[str, str]:
-    """Attributes to tell, and versions of packages."""
+    """Attributes that a comparison notes, and versions of packages."""
     found = {str(name): value for name, value in attributes.items()} | from_json(attributes.get("software"))
     return {name: str(value) for name, value in found.items() if name not in HIDDEN_ATTRIBUTES}
 
@@ -247,7 +247,7 @@ def _why_unlike(one: xr.DataArray, other: xr.DataArray) -> str:
 
 
 def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int | None) -> tuple[CellsOfOne, ...]:
-    """Cells that only one side requests, of each side."""
+    """Cells that only one side requests, for each side."""
     masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
     alone = []
     for mask, other in zip(masks, masks[::-1]):
@@ -268,7 +268,7 @@ def _compare_variable(
     tolerance: Tolerance,
     most: int | None,
 ) -> VariableChanges:
-    """Compare a variable with common labels; of a curve or field its worst point."""
+    """Compare a variable on common labels; a curve or field counts by its worst point."""
     names = sorted(map(str, one.dims), key=lambda name: name not in dimensions)
     one, other = one.transpose(*names), other.transpose(*names)
     name = str(one.name)
@@ -332,7 +332,7 @@ def _labels(array: xr.DataArray, place: Iterable[int]) -> Labels:
 
 
 def _as_words(array: xr.DataArray) -> np.ndarray:
-    """Flags as words, empty where nothing was requested."""
+    """Convert flags to words; empty where nothing was requested."""
     known, back = np.unique(array.values, return_inverse=True)
     words = flag_words(array)
     said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]

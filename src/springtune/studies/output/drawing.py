@@ -1,4 +1,4 @@
-"""Plots of a single scene and of a single curve in the style of all figures, and what figures of networks share."""
+"""Plots of a single scene and of a single curve, and what figures of networks share."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ LARGEST_ERROR_SHOWN = 100.0
 """Largest error of a curve in a plot [%]."""
 
 BEYOND_SMALL_STRAIN = "beyond small strain"
-"""What a figure says of errors against references that do not apply, `reference_applies` false."""
+"""Note of a figure on errors whose reference does not apply, `reference_applies` false."""
 
 NO_RESULT, NOT_ASKED = "×", "–"
 """Cells of a heat map without an error."""
@@ -78,8 +78,8 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
         )
         said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
     else:
-        labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)
-    labels.finish(panel, said)
+        labels.write_reason(panel, curve.message or "There is no reference, and so no error.", bare=False)
+    labels.add_legend(panel, said)
     return panel
 
 
@@ -100,13 +100,13 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
 # -- networks of a dataset ---------------------------------------------------------------------------------------------
 
 
-def in_words(flags: "int | Iterable[int] | np.ndarray") -> str:
-    """Statuses of cells that were asked for in words, each once."""
+def status_words(flags: "int | Iterable[int] | np.ndarray") -> str:
+    """Statuses of requested cells in words, each once."""
     return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
 
 
 def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
-    """Cells coloured by the size of an error [%] with texts, both of shape (n_rows, n_columns)."""
+    """Draw cells coloured by the size of an error [%], with texts; both have shape (n_rows, n_columns)."""
     shade, (low, high) = np.log10(np.clip(np.abs(errors), *ERROR_RANGE)), np.log10(ERROR_RANGE)
     colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
     image = panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
@@ -118,18 +118,18 @@ def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
 
 
 def error_text(error: float, sign: str = "+") -> str:
-    """Error [%] with the digits that a cell of a heat map has room for."""
+    """Format an error [%] for a cell of a heat map."""
     size = abs(error)
     return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
 
 
-def plane(fields: "xr.Dataset", name: str) -> np.ndarray:
+def plane_vectors(fields: "xr.Dataset", name: str) -> np.ndarray:
     """Vectors in the plane from their components, such as ``"displacement_{}"``, shape (n, 2)."""
     return np.stack([fields[name.format(axis)].values for axis in "xy"], axis=1)
 
 
 def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, float]:
-    """Width and height of places, shape (n, 2), of which some may not be known; else those given."""
+    """Width and height of points, shape (n, 2), without NaN; `nothing` if they have no extent."""
     known = places[np.isfinite(places).all(axis=1)]
     wide, high = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
     return (float(wide), float(high)) if min(wide, high) > 0 else nothing
@@ -137,7 +137,7 @@ def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, flo
 
 def magnification(fields: "xr.Dataset") -> float:
     """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
-    places = np.concatenate([plane(fields, "{}"), plane(fields, "outline_{}")])
+    places = np.concatenate([plane_vectors(fields, "{}"), plane_vectors(fields, "outline_{}")])
     sizes = np.hypot(fields.reference_displacement_x.values, fields.reference_displacement_y.values)
     if not np.isfinite(sizes).any():
         sizes = np.hypot(fields.displacement_x.values, fields.displacement_y.values)
@@ -160,14 +160,14 @@ def draw_network(
 
     Return its lines if they are coloured by their force, up to `most` [N]; None also without displacements.
     """
-    outline, there = plane(fields, "outline_{}"), plane(fields, "reference_displacement_{}")
+    outline, there = plane_vectors(fields, "outline_{}"), plane_vectors(fields, "reference_displacement_{}")
     rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
     for number in range(int(rounds.max(initial=-1)) + 1):
         places = np.flatnonzero(rounds == number)
         closed = np.append(places, places[:1])
         panel.plot(*1e3 * (outline + scale * there)[closed].T, color="0.7", linewidth=2.0, zorder=1)
         panel.plot(*1e3 * outline[closed].T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
-    moved = 1e3 * (plane(fields, "{}") + scale * plane(fields, "displacement_{}"))
+    moved = 1e3 * (plane_vectors(fields, "{}") + scale * plane_vectors(fields, "displacement_{}"))
     if not np.isfinite(moved).any():
         return None
     nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)

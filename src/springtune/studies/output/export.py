@@ -101,7 +101,7 @@ SCENES_LIST = "scenes.csv"
 
 
 def write_scenes(tree: xr.DataTree, folder: Path) -> list[Path]:
-    """Write a file for each scene that has fields, and their table."""
+    """Write a VTU file for each scene with fields, and a table of the files."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.vtu"):
         old.unlink()

@@ -56,7 +56,7 @@ def wrap_to_panel(panel: Axes, texts: Iterable[str], size: float = SMALL_TEXT, s
 # -- lines -------------------------------------------------------------------------------------------------------------
 
 
-def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
+def group_equal_curves(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
     """Groups of curves that look like one line, in order."""
     groups: list[list[str]] = []
     for name, values in curves.items():
@@ -71,7 +71,7 @@ def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
 
 
 def sizes_axis(panel: Axes, sizes: np.ndarray, count: int) -> list[np.ndarray]:
-    """Axis of mesh sizes [mm]: places of each of so many lines; a single size has its points side by side."""
+    """Set up an axis of mesh sizes [mm]; return the x of each line: points of a single size stand side by side."""
     if len(sizes) == 1:
         panel.set(xlabel=f"One mesh size, {sizes[0]:g} mm", xlim=(-0.6, count - 0.4), xticks=[])
         return [np.array([float(number)]) for number in range(count)]
@@ -82,23 +82,23 @@ def sizes_axis(panel: Axes, sizes: np.ndarray, count: int) -> list[np.ndarray]:
     return [sizes] * count
 
 
-def statuses(flags: np.ndarray) -> dict[str, int]:
-    """Number of cells of each status but those that were not asked for, by its words."""
+def count_statuses(flags: np.ndarray) -> dict[str, int]:
+    """Number of requested cells by status in words."""
     return {str(Status(flag)).replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
 
 
 # -- texts -------------------------------------------------------------------------------------------------------------
 
 
-def finish(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:
-    """Name lines in the order of their ends, and write notes below; without any line write `why` there is none."""
+def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:
+    """Name lines in the order of their ends, and write notes below; without lines write `why`."""
     ends = {}
     for line in panel.get_lines():
         values = np.asarray(line.get_ydata(), dtype=float)
         if not str(line.get_label()).startswith("_") and np.isfinite(values).any():
             ends[line] = values[np.isfinite(values)][-1]
     if why and not ends:
-        say(panel, why)
+        write_reason(panel, why)
         return
     handles = [*sorted(ends, key=lambda line: -ends[line]), *key]
     if handles:
@@ -106,18 +106,18 @@ def finish(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[A
         place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
         texts = [wrap_to_panel(panel, [str(one.get_label())], share=WIDEST_NAME_SHARE) for one in handles]
         panel.legend(handles, texts, handlelength=2.2, borderaxespad=0.3, labelspacing=0.35, **place)
-    note(panel, said)
+    add_note(panel, said)
 
 
-def note(panel: Axes, texts: Iterable[str]) -> None:
+def add_note(panel: Axes, texts: Iterable[str]) -> None:
     """Write small texts below a panel's label, wrapped to its width."""
     if text := wrap_to_panel(panel, texts):
         panel.annotate(text, (0, 0), xycoords="axes fraction", xytext=(0, -0.38 * POINTS_PER_INCH), va="top",
                        textcoords="offset points", fontsize=SMALL_TEXT, color="0.25")  # fmt: skip
 
 
-def say(panel: Axes, text: str, bare: bool = True) -> None:
-    """Write in the middle of an empty panel what is missing and why."""
+def write_reason(panel: Axes, text: str, bare: bool = True) -> None:
+    """Write into an empty panel what is missing and why."""
     panel.text(
         0.5, 0.5, wrap_to_panel(panel, [text], 8), transform=panel.transAxes, ha="center", va="center", color="0.25"
     )
@@ -126,7 +126,7 @@ def say(panel: Axes, text: str, bare: bool = True) -> None:
         panel.grid(False)
 
 
-def entitle(figure: Figure | SubFigure | None, title: str, said: str = "") -> None:
+def add_title(figure: Figure | SubFigure | None, title: str, said: str = "") -> None:
     """Write the title of a figure, and a note below all panels, wrapped to its width."""
     if figure is None:
         return
@@ -138,7 +138,7 @@ def entitle(figure: Figure | SubFigure | None, title: str, said: str = "") -> No
 
 
 def swatches(colours: Mapping[str, str]) -> list[Patch]:
-    """Coloured boxes of a legend, by their texts."""
+    """Coloured boxes for a legend."""
     return [Patch(facecolor=colour, edgecolor="0.3", linewidth=0.4, label=text) for text, colour in colours.items()]
 
 
@@ -154,9 +154,9 @@ def small_multiples(
     said: str = "",
     key: Sequence[Artist] = (),
 ) -> np.ndarray:
-    """Draw a panel a title, each of a `height` [inch], shape (n_panels,), with a key of all.
+    """Draw a panel of some `height` [inch] for each title; return the panels, shape (n_panels,).
 
-    `draw` gets a panel and its part; it returns notes, and the reason if it drew no line, see `finish`.
+    `draw` gets a panel and its part; it returns notes, and the reason if it drew no line, see `add_legend`.
     """
     given = ax is not None and not isinstance(ax, Figure | SubFigure)
     wide = style.COLUMN_WIDTH if len(shown) == 1 < columns else style.PAGE_WIDTH
@@ -169,14 +169,14 @@ def small_multiples(
     for panel, (name, part) in zip(flat, shown.items()):
         panel.set_title(wrap_to_panel(panel, [name], 8))
         notes, why = draw(panel, part)
-        finish(panel, notes, why)
+        add_legend(panel, notes, why)
         lines = max(lines, panel.get_title("left").count("\n") + len(wrap_to_panel(panel, notes).splitlines()))
         if legend := panel.get_legend():
             names = sum(1.4 + text.get_text().count("\n") for text in legend.get_texts())
             height = max(height, LINE_HEIGHT * names + 0.4)
     for panel in axes[:, 1:].flat if sharey else ():
         panel.set_ylabel("")
-    entitle(figure, title, said)
+    add_title(figure, title, said)
     if key:
         place: dict[str, Any] = {"loc": "outside upper right", "ncols": len(key)} if figure else {}
         (figure or flat[-1]).legend(handles=key, **place)

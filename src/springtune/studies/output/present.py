@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
-    """Draw the figures of outputs into ``folder/figures``, and write their tables and other files."""
+    """Draw the figures of outputs into ``folder/figures``, and write their other files."""
     made: list[Path] = []
     figures = Path(folder) / "figures"
     with reading.open(dataset) as tree:

@@ -62,7 +62,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
     with ExitStack() as stack:
         file = stack.enter_context(opened(path))
-        with legible(path), bounded(OPENING_BYTES):
+        with readable(path), bounded(OPENING_BYTES):
             found = tree(file)
         found.set_close(stack.pop_all().close)
     return found
@@ -70,12 +70,12 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> "Iterator[h5netcdf.File]":
-    """Context of the file of a dataset, which is known to be one of springtune."""
+    """Context of the open file of a dataset; other files are refused."""
     import h5netcdf
 
     path = dataset_file(path)
     with ExitStack() as stack:
-        with legible(path), bounded(OPENING_BYTES):
+        with readable(path), bounded(OPENING_BYTES):
             check_alone(path)
             file = stack.enter_context(h5netcdf.File(path, decode_vlen_strings=True))
             attributes = dict(file.attrs)
@@ -88,8 +88,8 @@ def opened(path: str | os.PathLike[str]) -> "Iterator[h5netcdf.File]":
 
 
 @contextmanager
-def legible(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Context of a refusal of whatever the libraries raise when they trip over a damaged file."""
+def readable(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Context that turns any error of the libraries on a damaged file into a refusal."""
     try:
         yield
     except DataElsewhere:
@@ -147,7 +147,7 @@ def without_fields(data: "xarray.DataTree") -> str:
 
 
 def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
-    """Network of one beam and mesh type with its whole fields: an unstructured mesh by the conventions UGRID-1.0.
+    """Network of one beam and mesh type with its fields, as an unstructured mesh by UGRID-1.0.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.D
 
 
 def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
-    """Labels of a figure: given ones, and those without alternative."""
+    """Labels of a figure: the given ones, and the only label of each other dimension."""
     chosen = {name: label for name, label in selection.items() if name in present.dims}
     given = [name for name, label in chosen.items() if label is not None]
     for name in sorted(chosen, key=lambda name: name not in given):
@@ -90,7 +90,7 @@ def unswept(root: xr.Dataset) -> xr.Dataset:
 
 
 def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Swept values of whole fields."""
+    """Swept values whose fields the dataset holds."""
     names = [name for name in SWEPT if name in root.dims and f"{SHOWN_PREFIX}{name}" in fields]
     coordinates = [name for name in root.dims if name in SWEPT]
     # Nothing is kept of what has no value: any will do.
@@ -99,7 +99,7 @@ def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]
 
 
 def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
-    """Select swept values by beam, material and load."""
+    """Select one swept value for each beam, material and load."""
     chosen = {name: value for name, value in values.items() if name in data.dims}
     if not chosen:
         return data
@@ -116,7 +116,7 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
 
 
 def sign_of_errors(data: xr.Dataset) -> str:
-    """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
+    """Sentence on which sign of a group's errors means too soft; empty without references."""
     if "reference_displacement" not in data:
         return ""
     references = data.reference_displacement
@@ -125,7 +125,7 @@ def sign_of_errors(data: xr.Dataset) -> str:
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:
-    """Labels of a dimension with any cell present, in dataset order."""
+    """Labels of a dimension that have a present cell, in dataset order."""
     there = present.any([dimension for dimension in present.dims if dimension != name])
     return there[name].values[there.values].tolist()
 
@@ -150,7 +150,7 @@ def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> li
     return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
 
-def listed(
+def table_rows(
     data: xr.Dataset,
     present: xr.DataArray,
     names: Collection[str],
@@ -183,8 +183,8 @@ OWN_LAW_REFERENCES = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERE
 """References of own laws, by priority; the last one of materials in plane strain alone."""
 
 
-def own_laws(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
-    """References of own laws in a group, and the group without the numbers of those in plane strain of other sheets."""
+def own_law_references(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
+    """References of a material's own law, and the group without plane-strain numbers of plane-stress materials."""
     laws = [kind for kind in OWN_LAW_REFERENCES if kind in data.reference.values]
     if "material_plane" not in data:
         return [kind for kind in laws if kind != STRAINED_REFERENCE], data
@@ -193,9 +193,9 @@ def own_laws(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
     return laws, data.assign({name: one.where(own) for name, one in numbers.items()}).drop_vars("material_plane")
 
 
-def of_own_law(finite: xr.Dataset) -> xr.Dataset | None:
-    """Select the references of each material's own law and plane."""
-    laws, finite = own_laws(finite)
+def select_own_law(finite: xr.Dataset) -> xr.Dataset | None:
+    """Select the reference of each material's own law and plane."""
+    laws, finite = own_law_references(finite)
     if not laws:
         return None
     found = finite.sel(reference=laws[-1], drop=True)
@@ -210,21 +210,21 @@ def of_own_law(finite: xr.Dataset) -> xr.Dataset | None:
     return found
 
 
-def judged(data: xr.Dataset, finite: xr.Dataset | None = None) -> xr.DataArray:
+def valid_errors(data: xr.Dataset, finite: xr.Dataset | None = None) -> xr.DataArray:
     """Deformation errors of solved cells whose reference applies, NaN elsewhere.
 
     Those of nonlinear networks are against references at `finite` strain where there are any.
     """
     solved = data.status == Status.SOLVED
     errors = data.deformation_error.where(solved & (data.get("reference_applies", 1) == 1))
-    at_finite_strain = None if finite is None else of_own_law(finite)
+    at_finite_strain = None if finite is None else select_own_law(finite)
     if at_finite_strain is not None:
         errors = errors.where(data.kinematics == "linear", at_finite_strain.deformation_error.where(solved))
     return errors.transpose(*data.deformation_error.dims)
 
 
-def own_law(cell: xr.Dataset, name: str) -> str | None:
-    """Label of one material's own reference; an unsolved requested one counts last, None without any."""
-    kinds, cell = own_laws(cell)
+def own_law_reference(cell: xr.Dataset, name: str) -> str | None:
+    """Label of a material's own reference: a solved one if there is any; None without a reference."""
+    kinds, cell = own_law_references(cell)
     there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
     return next(iter(there or kinds[::-1]), None)

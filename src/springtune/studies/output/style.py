@@ -82,7 +82,7 @@ SAVED_AS: dict[str, dict[str, Any]] = {
 
 
 def line(number: int) -> dict[str, Any]:
-    """Colour, dashes and marker of the line of that number; beyond the last, colours come back with other markers."""
+    """Colour, dashes and marker of a line by its number; colours repeat with other markers."""
     turn, colour = divmod(number, len(LINE_STYLES))
     return LINE_STYLES[(colour + 2 * turn) % len(LINE_STYLES)] | {"color": LINE_STYLES[colour]["color"]}
 
@@ -102,7 +102,7 @@ def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
 
 
 def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
-    """Decorator: a function that plots in `SETTINGS`, which are put back after it."""
+    """Decorator that runs a plot function with `SETTINGS` and restores them."""
 
     @wraps(plot)
     def inside(*arguments: P.args, **keywords: P.kwargs) -> Drawn:
@@ -118,7 +118,7 @@ def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
 
 
 def _show_texts_verbatim(panel: Axes) -> None:
-    """Take texts as they are: no formulas between $ signs, no ligatures. Powers of ten beside ticks are formulas."""
+    """Show texts verbatim: no formulas between $ signs, no ligatures. Powers of ten beside ticks stay formulas."""
     legend = panel.get_legend()
     found = [panel.xaxis.label, panel.yaxis.label, *panel.get_children(), *panel.figure.get_children()]
     for one in (*found, *(legend.get_texts() if legend else ())):
@@ -136,7 +136,7 @@ def panels(
     figsize: tuple[float, float],
     **subplots: Any,
 ) -> tuple[Figure | SubFigure | None, np.ndarray]:
-    """Axes of shape (nrows, ncols) to plot on, and the figure where it is to be arranged; `subplots` as there."""
+    """Return the figure to arrange, if any, and axes of shape (nrows, ncols)."""
     if ax is None:
         # Here, since pyplot chooses a backend: who only imports, or plots on axes that are there, chooses none.
         import matplotlib.pyplot as plt
@@ -153,7 +153,7 @@ def panels(
 
 
 def size(figure: Figure | SubFigure) -> tuple[float, float]:
-    """Width and height of a figure, or of a part of one [inch]."""
+    """Width and height of a figure or subfigure [inch]."""
     box = figure.bbox.transformed(figure.dpi_scale_trans.inverted())
     return box.width, box.height
 

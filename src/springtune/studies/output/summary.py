@@ -1,4 +1,4 @@
-"""Summary of a run: what Snakemake's process adds to the stored summary of the dataset, see `summing_up.text`."""
+"""Report at the end of a run, around the stored summary of the dataset, see `summing_up.text`."""
 
 import os
 import time
@@ -37,7 +37,7 @@ def broken(study: "Study", jobs: Jobs, since: float) -> str:
 
 
 def beside(study: "Study", jobs: Jobs, since: float) -> str:
-    """Report on a study that the paper needed."""
+    """Report on another study that the paper reads."""
     undone = [job.name for job in jobs.values() if job.stage and not job.record.exists()]
     lines = [f"new in {study.name}: {_count_new_results(jobs, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
@@ -55,7 +55,7 @@ def _last_line(log: Path) -> str:
 
 
 def _failed_logs(jobs: Jobs, since: float) -> list[Path]:
-    """Logs of jobs that failed or were stopped in this run, which wrote no record in it."""
+    """Logs of jobs that failed or were stopped in this run: they wrote no record."""
     logs = sorted((_folder(jobs) / "logs").glob("*.log"))
     records = {path: _folder(jobs) / RECORDS / f"{path.stem}.json" for path in logs}
     return [path for path, record in records.items() if _modified(path) >= since and _modified(record) < since]

@@ -1,4 +1,4 @@
-"""A dataset as text: solved cells, failures with reasons, errors; its groups, and where it comes from.
+"""Dataset as text: solved cells, failures with reasons, errors, groups, origin.
 
 The stage `collect` writes `text` beside the dataset; `info` adds what the file is.
 """
@@ -17,7 +17,7 @@ from springtune.safe_io.escapes import shown
 from springtune.safe_io.tables import aligned
 
 from . import reading
-from .selection import judged, of_own_law
+from .selection import select_own_law, valid_errors
 from .text import NOT_ALL_SOLVED, bytes_text, from_json, paragraphs, place_text, sign_text, without_numbers
 
 CELLS_NAMED = 3
@@ -66,7 +66,7 @@ Cells = list[tuple[str, str]]
 
 
 def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
-    """For each status variable: its subject, counts by flag, and unsolved cells."""
+    """Subject, counts by flag and unsolved cells of each status variable."""
     for variable in data.data_vars.values():
         label = str(variable.name)
         message = label.removesuffix("status") + "message"
@@ -96,7 +96,7 @@ def _count_words(found: Mapping[Status, int]) -> str:
 
 
 def _cell_lines(cells: Cells) -> Iterator[str]:
-    """Some cells, first one for each reason, and the number of others."""
+    """Lines on some cells, one for each reason first, and the number of others."""
     reasons: dict[str, Cells] = {}
     for cell in cells:
         reasons.setdefault(without_numbers(cell[1]), []).append(cell)
@@ -112,7 +112,7 @@ def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> It
     """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
     if "definition" not in root.get("deformation_error", root).dims:
         return
-    errors = judged(root, finite)
+    errors = valid_errors(root, finite)
     by = [name for name in ("definition", "kinematics") if name in errors.dims]
     found = []
     for labels in product(*(errors[name].values.tolist() for name in by)):
@@ -131,7 +131,7 @@ def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> It
             "",
             "deformation errors, (network - reference) / |reference|, of solved scenes within the reference",
         )
-        if finite is not None and of_own_law(finite) is not None:
+        if finite is not None and select_own_law(finite) is not None:
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         heads = [*by, "scenes", "median", "worst", "", "at"]
         right = range(len(by), len(by) + 3)
@@ -161,7 +161,7 @@ def _lines_on_references(root: xr.Dataset, called: str) -> Iterator[str]:
 
 
 class Info(str):
-    """Content of a dataset: a text that terminals and notebooks show as it is."""
+    """Text that terminals and notebooks show verbatim."""
 
     def __repr__(self) -> str:
         return str(self)

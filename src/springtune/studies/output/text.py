@@ -96,7 +96,7 @@ def variable_name(group: str, variable: str) -> str:
 
 
 def from_json(text: object) -> dict[str, Any]:
-    """Content of an attribute with JSON; empty if it has none."""
+    """Parse an attribute with JSON; empty if it has none."""
     try:
         return dict(json.loads(str(text or "{}")))
     except ValueError:
@@ -114,7 +114,7 @@ def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
-    """Decimals that show so many significant digits of a column; NaN is a missing number.
+    """Decimals that show so many significant digits of a column; None if there would be too many.
 
     The largest number has all of them, the smallest nonzero one at most one fewer.
     """

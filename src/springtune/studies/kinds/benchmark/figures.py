@@ -82,14 +82,15 @@ def plot_benchmark(data, ax=None, *, scene=None):
         panel.plot(seconds[ring], errors[ring], "o", **RING_STYLE)
     panel.set(xlabel="Run time from mesh to displacement [s]", ylabel="|Error| [%]", title=case.scene.item())
     if not shown:
-        labels.say(panel, f"No approach has an error and a time: {_missing_cases(case) or 'none was requested'}.")
+        why = _missing_cases(case) or "none was requested"
+        labels.write_reason(panel, f"No approach has an error and a time: {why}.")
         return panel
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
         panel.plot([seconds], [estimate], "*", color="black", markersize=7, label="the reference")
     panel.set(**style.LOGARITHMIC)
     style.plain(panel, "x", "y")
-    labels.finish(panel, [lost])
+    labels.add_legend(panel, [lost])
     return panel
 
 
@@ -101,5 +102,5 @@ def _scene(data, scene):
 
 def _missing_cases(case):
     """Count the cases without numbers by status, in words; empty if all have them."""
-    counts = labels.statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
+    counts = labels.count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)

@@ -44,15 +44,15 @@ STEP_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "million_springs_a_second": 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
     from ...output.dataset import STATUS  # here, since a plan does without xarray
-    from ...output.selection import listed
+    from ...output.selection import table_rows
 
     if "benchmark" not in tree:
         return []
     data = tree["benchmark"].to_dataset()
     asked = (data.status != 0).transpose("scene", "mesh_size", "approach")
-    cases = listed(data, asked, ("scene", "approach", "status", "message"), CASE_COLUMNS)
+    cases = table_rows(data, asked, ("scene", "approach", "status", "message"), CASE_COLUMNS)
     cases = [row | {"status": STATUS[row["status"]]} for row in cases]
-    steps = listed(data, data.spring_updates.notnull(), ("precision", "thread_count"), STEP_COLUMNS)
+    steps = table_rows(data, data.spring_updates.notnull(), ("precision", "thread_count"), STEP_COLUMNS)
     note = "Error, and run time with its parts, meshing included: medians of warm runs."
     about = "Nonlinear springs that explicit steps advance per second."
     return [

@@ -9,7 +9,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, in_words, magnification, plane
+from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, plane_vectors, status_words
 from ...output.selection import (
     at,
     cells,
@@ -18,7 +18,7 @@ from ...output.selection import (
     labelled_beam,
     labels_of,
     last_swept,
-    own_law,
+    own_law_reference,
     shown_swept,
     sign_of_errors,
 )
@@ -111,7 +111,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
         if panel.get_xlim()[0] < value < panel.get_xlim()[1]:
             mark_stiffness(panel, value, f"the paper's {value:g}")
     key = [Line2D([], [], color="0.3", label=text, **look) for name, (text, look) in LEGEND.items() if name in seen]
-    labels.finish(panel, why=_reason_without_curve(curves), key=key)
+    labels.add_legend(panel, why=_reason_without_curve(curves), key=key)
     return panel
 
 
@@ -142,7 +142,7 @@ def draw_curve(panel, curve, unit, name, look, known):
     if np.isfinite(unstable).any():
         seen.add("unstable")
         panel.plot(stiffness / unit, unstable, color=colour, linewidth=0.5)
-    return seen | {in_words(flag) for flag in flags[np.isnan(error)] if flag > 1 and np.isfinite(error).any()}
+    return seen | {status_words(flag) for flag in flags[np.isnan(error)] if flag > 1 and np.isfinite(error).any()}
 
 
 LEGEND = {
@@ -174,7 +174,7 @@ def _reason_without_curve(curves):
     if 1 in curves.status.values:
         return "solved, but without a reference there is no error"
     messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
-    return "; ".join([f"no stiffness has an error: {in_words(curves.status.values)}", *messages[:1]])
+    return "; ".join([f"no stiffness has an error: {status_words(curves.status.values)}", *messages[:1]])
 
 
 def swept_words(values):
@@ -269,7 +269,7 @@ def plot_deformed(
     for name in beams:
         words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
         shown[", ".join(words)] = fields.sel(beam=name).sel(chosen), cut.sel(beam=name)
-    extents = [extent(plane(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
+    extents = [extent(plane_vectors(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
     height = max(float(np.clip((style.PAGE_WIDTH - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
     title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
@@ -294,9 +294,9 @@ def _draw_deformed(panel, part):
     beyond = [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
     notes = beyond if here.reference_displacement_x.notnull().any() else ["no reference"]
     if not here.displacement_x.notnull().any():
-        notes.append(f"no network: {in_words(flag) or 'not asked for'}" if flag != 1 else "no network stored")
+        notes.append(f"no network: {status_words(flag) or 'not asked for'}" if flag != 1 else "no network stored")
     elif flag not in (0, 1):
-        notes.append(in_words(flag))
+        notes.append(status_words(flag))
     return notes, ""
 
 
@@ -353,11 +353,11 @@ def _draw_lines(panel, places, here, looks, listed, gaps):
         doubtful, lost = known & ((flags > 1) | beyond), {}
         hollow = look | {"linestyle": "", "markerfacecolor": "white", "markersize": 4.5, "zorder": 4}
         panel.plot(x[doubtful], error[doubtful], **hollow)
-        doubts |= {in_words(flag) for flag in flags[doubtful] if flag > 1}
+        doubts |= {status_words(flag) for flag in flags[doubtful] if flag > 1}
         doubts |= {BEYOND_SMALL_STRAIN} if (known & beyond).any() else set()
         for place, flag in zip(np.flatnonzero(~known), flags[~known]):
             if flag:
-                lost.setdefault("no reference" if flag == 1 else in_words(flag), []).append(place)
+                lost.setdefault("no reference" if flag == 1 else status_words(flag), []).append(place)
         said += [f"{name}, {listed(numbers)}: {reason}" for reason, numbers in lost.items()]
     panel.axhline(0, color="0.3", linewidth=0.7, zorder=1)
     return [f"hollow: {', '.join(sorted(doubts))}", *said] if doubts else said
@@ -645,13 +645,13 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     values = last_swept(here.status != 0)
     words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
     words += swept_words({name: value.sel(load=load) for name, value in values.items()})
-    labels.entitle(figure, ", ".join(words))
+    labels.add_title(figure, ", ".join(words))
     left, right = axes[0]
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
     here, faces = at(here, values), at(faces.sel(chosen), values)
     curves = None if curves is None else at(curves, values)
-    labels.finish(left, *_draw_errors_over_stiffness(left, curves, here))
-    labels.finish(right, *_draw_pressed_face(right, faces, here, load))
+    labels.add_legend(left, *_draw_errors_over_stiffness(left, curves, here))
+    labels.add_legend(right, *_draw_pressed_face(right, faces, here, load))
     return axes[0]
 
 
@@ -695,7 +695,7 @@ def _draw_pressed_face(panel, block, root, load):
     x, pressed, said = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")
-    law = own_law(pressed, "reference_face_profile")
+    law = own_law_reference(pressed, "reference_face_profile")
     finite = bool(law) and bool(
         pressed.reference_face_profile.sel(reference=law).notnull().any()
         and solved.sel(kinematics=solved.kinematics != "linear").any()
@@ -712,7 +712,7 @@ def _draw_pressed_face(panel, block, root, load):
             profiles[f"{definition}, {drawn[0]}"] = profile
         else:
             flags = root.status.sel(load=load, definition=definition, kinematics=usual).values
-            said.append(f"{definition}: {'in the dataset' if drawn else in_words(flags) or 'not asked for'}")
+            said.append(f"{definition}: {'in the dataset' if drawn else status_words(flags) or 'not asked for'}")
     looks = [{"color": "0.72", "linewidth": 3}, *(style.line(number) | {"marker": ""} for number in range(MOST_FACES))]
     for (name, profile), look in zip(profiles.items(), looks):
         panel.plot(x, -1e3 * profile.values, label=name, **look)

@@ -15,7 +15,7 @@ from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.safe_io.inputs import fault
+from springtune.safe_io.inputs import why_unreadable
 from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import FEWER, check_able, check_density, check_particles
@@ -161,7 +161,7 @@ def check(config, problems):
             continue
         extents = {}
         for file in files_of(shape, problems.folder).values():
-            if why := fault(file):
+            if why := why_unreadable(file):
                 problems.add((*path, "file"), f"'{file}': {why}; {FROM_THE_STUDY}")
             elif problems.nothing:
                 _check_file(name, shape, Path(file), path, problems, extents)

@@ -80,11 +80,11 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
     figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE_WIDTH, 0.35 + tall * rows))
-    labels.entitle(figure, title)
+    labels.add_title(figure, title)
     for panels, name in zip(axes, names):
         _draw_errors(panels, cut, name, points[name])
     for panel in axes.flat if not names else ():
-        labels.say(panel, "No quantity was asked for.")
+        labels.write_reason(panel, "No quantity was asked for.")
     return axes
 
 
@@ -146,7 +146,7 @@ def _draw_errors(panels, cut, name, points):
     for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
         panel.set(xlabel=words, ylabel=f"|{against}| [%]")
         if not there:
-            labels.say(panel, _reason_without_error(cut))
+            labels.write_reason(panel, _reason_without_error(cut))
             continue
         panel.set(xscale="log", yscale="log")
         low = panel.get_ylim()[0]
@@ -155,7 +155,7 @@ def _draw_errors(panels, cut, name, points):
             panel.set_ylim(low, None)
         style.plain(panel, "x", "y")
     panels[1].set_ylabel("")
-    labels.finish(panels[1])
+    labels.add_legend(panels[1])
     panels[0].set_title(f"{name}: {described(cut, name)}")
     said = [f"{difference:.2g} % from expected"] if difference > 0 else []
     said += [f"known to {estimate:.1g} %"] if estimate > 0 else []
@@ -164,7 +164,7 @@ def _draw_errors(panels, cut, name, points):
 
 def _reason_without_error(cut):
     """Reason why a quantity has no error."""
-    states = drawing.in_words(cut.status.values) or "not asked for"
+    states = drawing.status_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"
 
@@ -212,7 +212,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
     if not np.isfinite(errors).any():
-        labels.say(panel, "No quantity has an error: see status and message.")
+        labels.write_reason(panel, "No quantity has an error: see status and message.")
         return panel
     drawing.heat_map(panel, errors, np.array(texts, dtype=object))
     panel.set_yticks(range(len(rows)), list(map(no_mathematics, rows)))
@@ -298,7 +298,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    places = np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")])
+    places = np.concatenate([drawing.plane_vectors(case, "{}"), drawing.plane_vectors(case, "outline_{}")])
     width, height = drawing.extent(places, (1.0, 1.0))
     columns = min(NETWORKS_IN_ROW, len(wanted))
     wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
@@ -347,5 +347,5 @@ def _draw_network(panel, one, state, scale, most):
     notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []
     if STATUS[int(state.status)] != "solved":
         message = f": {state.message.item()[:120]}" if lines is None else ""
-        notes.append(drawing.in_words(int(state.status)) + message)
+        notes.append(drawing.status_words(int(state.status)) + message)
     return notes

@@ -8,7 +8,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head
-from ...output.selection import cells, group, labels_of, listed, of_own_law, own_laws, records
+from ...output.selection import cells, group, labels_of, own_law_references, records, select_own_law, table_rows
 from ...output.text import decimals, number
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
 
@@ -30,7 +30,7 @@ def like_with_like(data):
     """Root with errors of nonlinear networks against references at finite strain, where there are any."""
     root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
-    finite = None if finite is None else of_own_law(finite)
+    finite = None if finite is None else select_own_law(finite)
     if finite is None:
         return root
     linear, names = root.kinematics == "linear", ("deformation_error", "reference_displacement", "reference_message")
@@ -76,7 +76,7 @@ def _scene_table(data, selection):
         {"mesh_size_mm": ("mesh_size", 1e3)} | _swept_columns(swept) | {"force_N": ("force", sign)} | NETWORK_COLUMNS
     )
     present = (data.status != 0).transpose("beam", "mesh_size", *swept, "kinematics", "definition")
-    rows = listed(data, present, ("beam", "kinematics", "definition"), columns)
+    rows = table_rows(data, present, ("beam", "kinematics", "definition"), columns)
     words = {-1: "unknown", 0: "no", 1: "yes"}
     for row in rows:
         row |= {"status": STATUS[row["status"]], "reference_applies": words[int(row["reference_applies"])]}
@@ -142,12 +142,12 @@ def _rows(data, present, order, network, reference, error):
     columns = _swept_columns(present.dims) | {"mesh_size_mm": ("mesh_size", 1e3), "network_mm": (network, 1e3)}
     columns |= {"reference_mm": (reference, 1e3), "error_percent": (error, 100)}
     names = ("beam", "material", "load", "mesh_type", "definition", "kinematics", "reference")
-    return listed(data, present.transpose(*order, ...), names, columns)
+    return table_rows(data, present.transpose(*order, ...), names, columns)
 
 
 def _finite_strain_table(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
-    _, finite = own_laws(finite)
+    _, finite = own_law_references(finite)
     finite = finite.assign(displacement=root.displacement)
     order = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
     present = finite.deformation_error.notnull() & (finite.kinematics != "linear")
@@ -164,7 +164,7 @@ def _finite_strain_table(finite, root):
 
 def _block_table(block, root):
     """Middle of the pressed face: linear networks against small strain, others against finite strain if known."""
-    _, block = own_laws(block)
+    _, block = own_law_references(block)
     order = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
     present = block.face_error.notnull()
     if block.sizes["reference"] > 1:
@@ -192,7 +192,7 @@ def _shape_table(tree):
     columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
     columns |= {f"{name}_percent": (name, 100) for name in SHAPE_ERRORS}
     columns |= {name: (name, 1) for name in ("status", "message")}
-    rows = [row | {"status": STATUS[row["status"]]} for row in listed(data, present, SHAPE_COLUMNS, columns)]
+    rows = [row | {"status": STATUS[row["status"]]} for row in table_rows(data, present, SHAPE_COLUMNS, columns)]
     cited = (one for one in records(data, present, ["source"]) if one["source"])
     sources = dict.fromkeys(f"{one['shape']}, {one['quantity']}: {one['source']}" for one in cited)
     strained = tree.attrs.get("plane_strain")

@@ -95,7 +95,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
             panel.axvline(1e3 * FRAME_SECONDS, color="0.7", linewidth=0.9, zorder=0)
             said.insert(1, "right of the grey line: slower than real time")
         style.plain(panel, "x", "y")
-    labels.finish(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
+    labels.add_legend(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
     return panel
 
 

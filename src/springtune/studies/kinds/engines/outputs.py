@@ -60,14 +60,14 @@ ENGINE_COLUMNS = {
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.selection import listed  # here, since a plan does without xarray
+    from ...output.selection import table_rows  # here, since a plan does without xarray
     from . import RUN_ENDS
 
     if "engines" not in tree:
         return []
     data = tree["engines"].to_dataset()
     names = ("scene", "definition", "engine", "precision", "substeps", "iterations", "engine_status", "message")
-    rows = listed(data, data.status != 0, names, ENGINE_COLUMNS)
+    rows = table_rows(data, data.status != 0, names, ENGINE_COLUMNS)
     rows = [row | {"engine_status": RUN_ENDS[row["engine_status"]]} for row in rows]
     note = "Displacement at rest against finite elements: error of the definition in equilibrium, and of the solver."
     return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

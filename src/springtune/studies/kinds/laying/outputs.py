@@ -46,13 +46,13 @@ LAYING_COLUMNS = {
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.selection import listed  # here, since a plan does without xarray
+    from ...output.selection import table_rows  # here, since a plan does without xarray
 
     if "laying" not in tree:
         return []
     laid = tree["laying"].to_dataset()
     present = laid.area_under_strip.notnull().transpose("loading", "friction", "mesh_size", "definition")
-    rows = listed(laid, present, ("loading", "friction", "definition"), LAYING_COLUMNS)
+    rows = table_rows(laid, present, ("loading", "friction", "definition"), LAYING_COLUMNS)
     note = (
         "Area between strip and floor, and elongation of the strip's lower fibre. The reference elongation has an "
         "error band of twice the spread of three meshes: corners of the trapezoid catch between particles of the strip "

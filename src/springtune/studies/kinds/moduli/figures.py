@@ -75,10 +75,10 @@ def _moduli(panel, here):
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
-    for number, names in enumerate(labels.alike(curves, 0.012)):
+    for number, names in enumerate(labels.group_equal_curves(curves, 0.012)):
         panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
     said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
-    counts = ", ".join(f"{name} ({count})" for name, count in labels.statuses(here.status.values).items())
+    counts = ", ".join(f"{name} ({count})" for name, count in labels.count_statuses(here.status.values).items())
     return said, f"No definition has moduli here: {counts or 'none was requested'}."
 
 

@@ -77,7 +77,7 @@ def plot_sobol(data, ax=None, *, load=None):
         panel.grid(False, axis="y")
         if not np.isfinite(indices.first_order.values).any():
             none = "no base sample of which all scenes have a value"
-            labels.say(panel, "does not vary" if int(indices.base_samples) else none, bare=False)
+            labels.write_reason(panel, "does not vary" if int(indices.base_samples) else none, bare=False)
         return [], ""
 
     note = "full: first order, pale: total order; lines: bootstrap bands, 95 %" + ", cut off" * bool(

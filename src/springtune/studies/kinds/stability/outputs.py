@@ -84,7 +84,7 @@ STABILITY_TABLES = {
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.selection import listed  # here, since a plan does without xarray
+    from ...output.selection import table_rows  # here, since a plan does without xarray
 
     if "stability" not in tree:
         return []
@@ -92,6 +92,6 @@ def tables(tree):
     for name, (title, names, columns) in STABILITY_TABLES.items():
         if name in data.experiment.values:
             first = next(variable for variable, _ in columns.values() if variable not in data.coords)
-            rows = listed(data, data[first].notnull(), names, columns)
+            rows = table_rows(data, data[first].notnull(), names, columns)
             found.append({"stem": f"stability_{name}", "title": title, "rows": rows})
     return found

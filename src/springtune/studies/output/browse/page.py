@@ -78,7 +78,7 @@ def _compress(content: bytes) -> str:
 
 
 def _library() -> dict[str, str]:
-    """Scripts of BokehJS by name, without importing Bokeh, which takes longer than making the page."""
+    """Read the scripts of BokehJS; importing Bokeh would take longer than making the page."""
     found = find_spec("bokeh")
     if found is None or found.origin is None:
         raise FileNotFoundError("the package bokeh is not installed; `pip install bokeh` or `make study` installs it")
@@ -106,7 +106,7 @@ MOST_CHARACTERS = 4_200_000
 
 
 def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
-    """Describe and pack the groups of a dataset; of a large one the largest variables are left out, and named."""
+    """Describe and pack the groups of a dataset; leave out and name the largest variables if there is no room."""
     children = [group for group in file.groups.values() if group.variables]
     groups = [_describe(group, group.variables, file.variables) for group in (file, *children)]
     rows = [(group, row) for group in groups for row in group["variables"]]
@@ -150,13 +150,13 @@ def _describe(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[st
 
 
 def _labels(name: str, own: Variables, root: Variables) -> dict[str, Any]:
-    """Labels of a dimension, if it has any, and words on it."""
+    """Labels of a dimension with their unit and name; empty if it has none."""
     stored = own.get(name) or root.get(name)
     return {"labels": list(map(_json_value, stored[...].tolist()))} | _words_on(stored) if stored else {}
 
 
 def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
-    """Attributes in words."""
+    """Unit and name of a variable."""
     return {name: str(stored.attrs[name]) for name in ("units", "long_name") if name in stored.attrs}
 
 
@@ -167,7 +167,7 @@ def _values(stored: h5netcdf.Variable) -> np.ndarray:
 
 
 def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
-    """Values of an array whose axes are those of `dims`, of one place where it has none."""
+    """Values of an array with an axis for each of `dims`, of length 1 where it has none."""
     values = stored[...].transpose([stored.dimensions.index(name) for name in dims if name in stored.dimensions])
     return values[tuple(slice(None) if name in stored.dimensions else None for name in dims)]
 
@@ -186,7 +186,7 @@ REFERENCES = {
 
 
 def _mark_beyond_linear(own: Variables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
-    """Statuses, of which solved cells that the linear reference cannot judge get one of their own."""
+    """Give solved cells that the linear reference cannot judge a status of their own."""
     flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
     applies = own.get("reference_applies")
     if "solved" not in flags or applies is None or not set(applies.dimensions) <= set(row["dims"]):
@@ -199,14 +199,14 @@ def _mark_beyond_linear(own: Variables, row: dict[str, Any], status: np.ndarray)
 
 
 def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
-    """Whether the sign of an error means something: not that of a norm, or of a number printed without one."""
+    """Return whether an error has a sign; norms and numbers printed without one have none."""
     said = row.get("long_name", "")
     stated = re.search(r"signed|less 1|- 1$|network - reference", said)
     return "without sign" not in said and bool(stated or (values < 0).any())
 
 
 def _sign_sentence(name: str, own: Variables, root: Variables) -> str:
-    """Which sign of a group's errors means too soft, by their references."""
+    """Sentence on which sign of a group's errors means too soft."""
     reference = REFERENCES.get(name, "reference_displacement")
     reference = reference if reference in own else "reference_displacement"
     group = own if reference in own else root
@@ -229,7 +229,7 @@ def _sign_sentence(name: str, own: Variables, root: Variables) -> str:
 
 
 def _json_value(value: Any) -> Any:
-    """A label or an attribute for JSON, which has no NaN."""
+    """Convert a label or an attribute for JSON, which has no NaN."""
     if isinstance(value, np.ndarray):
         return [_json_value(one) for one in value.tolist()]
     if isinstance(value, np.generic):
@@ -255,7 +255,7 @@ def _pack_values(values: np.ndarray) -> dict[str, Any]:
 
 
 def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
-    """Pack an array: its bytes, and how to read them."""
+    """Pack an array: its bytes and how to read them."""
     long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
     points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
     numbers = values.reshape(-1, points)
