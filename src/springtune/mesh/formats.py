@@ -19,7 +19,8 @@ from ..safe_io.inputs import DataElsewhere, bounded, check_alone, why_unreadable
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas
 from .groups import LINEAR_CELLS_REMEDY, OTHER_FILES_REASON, Block, Content, GroupedMesh, part_names
-from .sheets import COORDINATE_TOLERANCE, box_fault, in_words, on_sides, outline_of, sheet_fault
+from .segments import in_words
+from .sheets import COORDINATE_TOLERANCE, box_fault, on_sides, outline_of, sheet_fault
 
 CORNER_COUNTS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
 """Points of cells that are read and of those that make groups, by meshio's name."""

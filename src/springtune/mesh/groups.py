@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import Mesh, MeshError
-from .sheets import edge_in_words, outline_of
+from .segments import edge_in_words
+from .sheets import outline_of
 
 
 @dataclass(frozen=True, eq=False)

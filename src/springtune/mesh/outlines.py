@@ -12,7 +12,7 @@ from .cells import Mesh, MeshError, signed_areas
 from .free import EDGE_FACTOR, Triangulation, triangulate, upright
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
-from .sheets import nearer
+from .segments import nearer
 from .sides import OutlineSide, Point, winds_about
 from .types import too_many
 

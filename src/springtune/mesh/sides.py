@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from .sheets import in_words, nearer, winding
+from .segments import in_words, nearer, winding
 
 Point = tuple[float, float]
 """Coordinates [m]."""

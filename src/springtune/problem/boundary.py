@@ -10,7 +10,8 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..mesh.groups import GroupedMesh, part_names
-from ..mesh.sheets import check_held, in_words
+from ..mesh.segments import in_words
+from ..mesh.sheets import check_held
 from .loads import MIDDLE, LoadKind, Side
 from .shapes import LoadCase, Quantity
 

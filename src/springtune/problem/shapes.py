@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ..mesh.sheets import in_words
+from ..mesh.segments import in_words
 from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, find_meeting, reversed_round, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_size, warn_of_thickness

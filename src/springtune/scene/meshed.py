@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..mesh.groups import GroupedMesh, part_names
-from ..mesh.sheets import in_words
+from ..mesh.segments import in_words
 from ..mesh.sides import OutlineSide
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import Shape

@@ -174,5 +174,5 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     # References know the mesh of a network by its type alone, so an edit of a mesh does not solve them again. The sides
     # of outlines are geometry, which load cases are on.
     reference = code.closure("studies.kinds.bodies.reference", without=("studies.kinds.bodies.shape_reference",)).files
-    assert {path.name for path in reference if path.parent.name == "mesh"} <= {"sides.py"}
+    assert {path.name for path in reference if path.parent.name == "mesh"} <= {"segments.py", "sides.py"}
     assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again
