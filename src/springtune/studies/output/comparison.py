@@ -50,6 +50,11 @@ class Tolerance:
     relative: float = RELATIVE_TOLERANCE
     absolute: float | None = None
 
+    def __post_init__(self) -> None:
+        for name, value in (("relative", self.relative), ("absolute", self.absolute)):
+            if value is not None and not 0 <= value < math.inf:  # with NaN nothing would differ
+                raise ValueError(f"{name}: {value} is no tolerance; give a number from 0 on")
+
 
 @dataclass(frozen=True)
 class Change:
