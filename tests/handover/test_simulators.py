@@ -183,6 +183,17 @@ def test_a_large_load_does_not_swing_into_a_folded_sheet(mesh_type, definition, 
     assert largest < 1.1 * static and not data.warning.number.any()
 
 
+def test_the_control_is_added_to_the_load(tmp_path):
+    one = scene()
+    model, data = loaded(one, tmp_path)
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator.sum() == pytest.approx(20e3, rel=1e-9)
+    data.ctrl[0] = -5e3
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator.sum() == pytest.approx(15e3, rel=1e-9)
+    assert model.actuator_ctrlrange.tolist() == [[-20e3, 20e3]]
+
+
 @pytest.mark.parametrize(
     ("mesh_type", "definition"),
     [("structured", "lattice"), ("free", "uniform"), ("braced", "axis-exact"), ("right", "delingette")],
@@ -208,6 +219,16 @@ def test_the_largest_step_is_sharp(mesh_type, definition, tmp_path):
                 break
         lost = bool(data.warning.number.any()) or not largest < 1e3 * static
         assert lost != stable, share
+
+
+def test_accelerations_beyond_those_of_mujoco_start_nothing_anew(tmp_path):
+    """A sheet as light as a soap film: accelerations above 1e10 m/s2, where MuJoCo else begins again at rest."""
+    light = st.Material("210 GPa", 0.3, density="1e-3 kg/m^3")
+    one = scene(material=light)
+    model, data = loaded(one, tmp_path)
+    positions = one.solve().displacements[~one.network.held]
+    mujoco.mj_step(model, data, steps_to_rest(model, one))
+    assert data.time > 0 and np.abs(data.qpos - positions).max() < 1e-4 * np.abs(positions).max()
 
 
 def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
