@@ -115,9 +115,9 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     return panel
 
 
-def mark_stiffness(panel, value, name):
+def mark_stiffness(panel, value, name, dash=2):
     """Draw a dashed line at a stiffness."""
-    panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1, label=name)
+    panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (dash, dash)), zorder=1, label=name)
 
 
 def draw_curve(panel, curve, unit, name, look, known):
@@ -687,6 +687,14 @@ def _draw_errors_over_stiffness(panel, curves, root):
     stated = networks.stiffness.sel(definition=networks.definition == "paper").values
     for value in np.unique(stated[np.isfinite(stated)]):
         mark_stiffness(panel, value, f"as stated: {value:.4g}")
+    if str(root.mesh_type.values) == "structured" and np.isfinite(middle):
+        # Held sideways, a sheet's modulus is E / (1 - nu^2), and that of a network, whose nu is 1/3, 9/8 E.
+        ratio = float(root.material_poisson_ratio)
+        ratio = ratio / (1 - ratio) if str(root.get("material_plane", "")) == "strain" else ratio
+        held = middle / (1 - ratio**2) / (9 / 8)
+        mark_stiffness(panel, middle, f"by closed form: {middle:.4g}", 1)
+        if low < held < high and abs(held / middle - 1) > 0.02:
+            mark_stiffness(panel, held, f"the same, sides held: {held:.4g}", 3)
     return said, ""
 
 
