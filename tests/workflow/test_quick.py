@@ -191,7 +191,7 @@ def test_calibrated_is_the_mean_best_stiffness(tree):
 def test_tables_and_figures_are_there(run, tree):
     results = run.folder / "results/quick"
     rows = list(csv.DictReader((results / "tables/table_1.csv").read_text().splitlines()))
-    assert [row["mesh_size_mm"] for row in rows] == ["2", "5"]
+    assert {row["mesh_size_mm"] for row in rows} == {"2", "5"}  # a row a network
     assert float(rows[0]["printed_displacement_mm"]) == 0.44
     page = (results / "tables/index.html").read_text()
     assert "Table 1" in page and "20 kN fits" in page
