@@ -13,7 +13,6 @@ A network may have energies besides its springs, see `springtune.mechanics.energ
 import copy
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -311,18 +310,6 @@ class Network:
         count, size = len(self.held), np.abs(self.stiffness)
         sums = 2 * (np.bincount(self.first, size, count) + np.bincount(self.second, size, count))
         return np.repeat(sums[:, None], 2, axis=1)
-
-    @cached_property
-    def typical_stiffness(self) -> dict[str, float]:
-        """Stiffness of the springs over the reference stiffness [1]: medians inside and on the outline, and extremes.
-
-        NaN where there are no such springs.
-        """
-        outline, sizes = self.mesh.on_outline, self.stiffness
-        parts: dict[str, tuple[np.ndarray, Any]]
-        parts = {"inside": (~outline, np.median), "outline": (outline, np.median)}
-        parts |= {"least": (np.ones_like(outline), np.min), "most": (np.ones_like(outline), np.max)}
-        return {name: float(of(sizes[part])) if part.any() else np.nan for name, (part, of) in parts.items()}
 
     def stiffness_of(self, particles: np.ndarray, matrices: np.ndarray) -> csc_array:
         """Assemble `matrices` (n, 2 m, 2 m) of groups of joined `particles` (n, m) with the tangent's sparsity."""

@@ -141,6 +141,7 @@ class MeshCache:
         self.references: dict[tuple[object, ...], Any] = {}
         self.networks = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
+        self._typical: tuple[np.ndarray, dict[str, float]] | None = None
         shared = like is not None and mesh.shares_cells(like.mesh)
         self._patterns: dict[bytes, Network] = dict(like._patterns) if like is not None and shared else {}
         self._networks: dict[bytes, tuple[Network, dict[tuple[object, ...], StaticProblem]]] = {}
@@ -185,6 +186,21 @@ class MeshCache:
             self.deriving += seconds
             self._derived = key, springs, seconds
         return self._derived[1], self._derived[2]
+
+    def typical_stiffness(self, springs: Springs) -> dict[str, float]:
+        """Stiffness of springs at rest [N/m]: medians inside and on the outline, the least and the most.
+
+        NaN where there are none. The last ones are kept over the reference stiffness.
+        """
+        sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
+        if self._typical is None or self._typical[0] is not sizes:
+            outline = self.mesh.on_outline
+            inside, around = sizes[~outline], sizes[outline]
+            found = {"inside": np.median(inside) if len(inside) else np.nan}
+            found |= {"outline": np.median(around) if len(around) else np.nan}
+            found |= {"least": sizes.min(initial=np.inf), "most": sizes.max(initial=-np.inf)}
+            self._typical = sizes, found
+        return {name: float(springs.reference * value) for name, value in self._typical[1].items()}
 
     def network(self, directions: np.ndarray, springs: Springs) -> Network:
         """Network of springs that is held in some `directions`, shape (n_points, 2)."""

@@ -18,7 +18,7 @@ from springtune.safe_io.tables import aligned
 
 from . import reading
 from .selection import select_own_law, valid_errors
-from .text import NOT_ALL_SOLVED, bytes_text, from_json, paragraphs, place_text, sign_text, without_numbers
+from .text import NOT_ALL_SOLVED, bytes_text, from_json, paragraphs, place_text, range_text, sign_text, without_numbers
 
 CELLS_NAMED = 3
 """Cells named for each status; more if fewer than two would remain."""
@@ -42,7 +42,10 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _count_words(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
-    lines += _errors(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP), most) if ROOT_GROUP in groups else ()
+    if ROOT_GROUP in groups:
+        for part in (_errors(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP), most),
+                     _stiffness_to_type(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP))):  # fmt: skip
+            lines += part
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
@@ -138,6 +141,40 @@ def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> It
         yield from aligned([heads, *(row for _, row in found[:most])], 2, right).splitlines()
     if most is not None and len(found) > most:
         yield f"  and of {len(found) - most} more at most {100 * found[most][0]:.2f} %"
+
+
+def _stiffness_to_type(root: xr.Dataset, finite: xr.Dataset | None) -> Iterator[str]:
+    """What to type on the finest mesh of each type and material: of the best definition and the best uniform one."""
+    if not {"stiffness_inside", "deformation_error"} <= {*root}:
+        return
+    errors, rows = abs(valid_errors(root, finite)), []
+    for mesh_type, material in product(root.mesh_type.values.tolist(), root.material.values.tolist()):
+        place = {"mesh_type": mesh_type, "material": material}
+        known = errors.sel(place).dropna("mesh_size", how="all")
+        if not known.size:
+            continue
+        size = known.mesh_size.values.min()
+        own, off = root.sel(place).sel(mesh_size=size), known.sel(mesh_size=size)
+        membrane = own.material_young_modulus * own.beam_thickness
+        medians = {name: np.nanmedian(one) for name in off.definition.values.tolist()
+                   if np.isfinite(one := off.sel(definition=name).values).any()}  # fmt: skip
+        uniform = {name for name in medians if own.stiffness.sel(definition=name).notnull().any()}
+        for names in ({*medians} - uniform, uniform):
+            if not names:
+                continue
+            best = min(sorted(names), key=medians.__getitem__)
+            found = own.sel(definition=best)
+            typed = [
+                values[np.isfinite(values)]
+                for values in (found.stiffness_inside.values, found.stiffness_outline.values)
+            ]
+            ratio = np.nanmedian((found.stiffness_inside / membrane).values)
+            rows.append([best, mesh_type, material, f"{1e3 * size:.4g} mm", *map(range_text, typed), f"{ratio:.3g}",
+                         f"{100 * medians[best]:.2g} %"])  # fmt: skip
+    if rows:
+        yield from ("", "what to type [N/m], on the finest mesh: the best definition, and the best uniform stiffness")
+        heads = ["definition", "mesh type", "material", "size", "inside", "outline", "inside / E t", "median error"]
+        yield from aligned([heads, *rows], 2, range(3, 8)).splitlines()
 
 
 def _lines_on_references(root: xr.Dataset, called: str) -> Iterator[str]:

@@ -103,6 +103,12 @@ def from_json(text: object) -> dict[str, Any]:
         return {}
 
 
+def range_text(values: Iterable[float]) -> str:
+    """Return the smallest and the largest value in four digits, or the one that they have in common."""
+    found = [*values]
+    return " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(found), max(found)))) if found else ""
+
+
 # -- tables ------------------------------------------------------------------------------------------------------------
 
 

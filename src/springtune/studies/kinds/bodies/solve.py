@@ -92,8 +92,7 @@ def _solve_problem(about, springs, seconds, task):
         "definition_seconds": seconds,
         "negative_pivots": found.negative_pivots,
     }
-    typical = found.problem.network.typical_stiffness
-    result |= {f"stiffness_{part}": springs.reference * value for part, value in typical.items()}
+    result |= {f"stiffness_{part}": value for part, value in about.sheet.typical_stiffness(springs).items()}
     if task.get("keep_fields") and found.equilibrium.converged:
         moved = found.equilibrium.displacements
         forces = found.problem.network.spring_forces(moved, task["kinematics"] == "linear")

@@ -9,7 +9,7 @@ from springtune.problem.parameters import SWEPT
 from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head
 from ...output.selection import cells, group, labels_of, own_law_references, records, select_own_law, table_rows
-from ...output.text import decimals, number
+from ...output.text import decimals, number, range_text
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
 
 
@@ -49,6 +49,8 @@ NETWORK_COLUMNS = {
     "printed_displacement_mm": ("paper_displacement", 1e3),
     "printed_error_percent": ("paper_deformation_error", 100),
     "stiffness_N_per_m": ("stiffness", 1),
+    "stiffness_inside_N_per_m": ("stiffness_inside", 1),
+    "stiffness_outline_N_per_m": ("stiffness_outline", 1),
     "network_mm": ("displacement", 1e3),
     "reference_mm": ("reference_displacement", 1e3),
     "error_percent": ("deformation_error", 100),
@@ -128,10 +130,15 @@ def _page_cells(rows, definitions, swept, finite):
 
 
 def _stiffnesses(rows):
-    """Text on the uniform stiffnesses of a table's networks."""
-    known = pd.DataFrame(rows).groupby("definition", sort=False)["stiffness_N_per_m"].agg(["min", "max"]).dropna()
-    ranges = {name: dict.fromkeys(f"{value:.4g}" for value in ends) for name, *ends in known.itertuples()}
-    return "; ".join(f"{name}: k = {' to '.join(texts)} N/m" for name, texts in ranges.items())
+    """Text on what to type: the stiffness of uniform definitions, and medians inside and on the outline of others."""
+    parts = []
+    for name, own in pd.DataFrame(rows).groupby("definition", sort=False):
+        words = {"stiffness_inside_N_per_m": " inside", "stiffness_outline_N_per_m": " on the outline"}
+        words = {"stiffness_N_per_m": ""} if own["stiffness_N_per_m"].notna().any() else words
+        found = {word: own[column].dropna() for column, word in words.items() if own[column].notna().any()}
+        texts = [f"{range_text(values)} N/m{word}" for word, values in found.items()]
+        parts += [f"{name}: k = {', '.join(texts)}"] if texts else []
+    return "; ".join(parts)
 
 
 # -- further tables ----------------------------------------------------------------------------------------------------
