@@ -39,7 +39,7 @@ def mesh(shape, size):
 def result(shape, load, size, definition):
     part = study().shapes
     wanted = {one.material for one in part.scenes if one.shape == shape}
-    material = part.materials_of(shape, *wanted)[""]
+    material = study().materials_of(shape, *wanted)[""]
     return st.Scene(
         part.shape[shape], mesh(shape, size), material, load, definition=definition, kinematics="linear"
     ).solve()

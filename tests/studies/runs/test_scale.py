@@ -79,7 +79,7 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
         tool.do_stages(config, "invent")
         with counted(plan.hash_of, store.read) as count:
             study = planned(config)[0]
-            groups = collect.gathered(study, jobs["collect"].folder)
+            groups = collect.groups_of_study(study, jobs["collect"].folder)
         # One a scene; there are half as many curves, which are hashed twice, and some references.
         assert len(study.scenes) == 16 * forces and count["hash_of"] < 3 * len(study.scenes)
         assert int((groups["/"].status == 1).sum()) == len(study.scenes)

@@ -156,6 +156,8 @@ def _stiffness_to_type(root: xr.Dataset, finite: xr.Dataset | None) -> Iterator[
         size = known.mesh_size.values.min()
         own, off = root.sel(place).sel(mesh_size=size), known.sel(mesh_size=size)
         membrane = own.material_young_modulus * own.beam_thickness
+        typed = own.stiffness_inside.notnull() | own.stiffness_outline.notnull()
+        off = off.where(typed.transpose(*off.dims))
         medians = {name: np.nanmedian(one) for name in off.definition.values.tolist()
                    if np.isfinite(one := off.sel(definition=name).values).any()}  # fmt: skip
         uniform = {name for name in medians if own.stiffness.sel(definition=name).notnull().any()}
@@ -164,12 +166,11 @@ def _stiffness_to_type(root: xr.Dataset, finite: xr.Dataset | None) -> Iterator[
                 continue
             best = min(sorted(names), key=medians.__getitem__)
             found = own.sel(definition=best)
-            typed = [
-                values[np.isfinite(values)]
-                for values in (found.stiffness_inside.values, found.stiffness_outline.values)
-            ]
-            ratio = np.nanmedian((found.stiffness_inside / membrane).values)
-            rows.append([best, mesh_type, material, f"{1e3 * size:.4g} mm", *map(range_text, typed), f"{ratio:.3g}",
+            sides = [found[f"stiffness_{part}"].values for part in ("inside", "outline")]
+            sides = [range_text(values[np.isfinite(values)]) for values in sides]
+            shares = (found.stiffness_inside / membrane).values
+            ratio = f"{np.nanmedian(shares):.3g}" if np.isfinite(shares).any() else ""
+            rows.append([best, mesh_type, material, f"{1e3 * size:.4g} mm", *sides, ratio,
                          f"{100 * medians[best]:.2g} %"])  # fmt: skip
     if rows:
         yield from ("", "what to type [N/m], on the finest mesh: the best definition, and the best uniform stiffness")
