@@ -166,8 +166,8 @@ def _stiffness_to_type(root: xr.Dataset, finite: xr.Dataset | None) -> Iterator[
                 continue
             best = min(sorted(names), key=medians.__getitem__)
             found = own.sel(definition=best)
-            sides = [found[f"stiffness_{part}"].values for part in ("inside", "outline")]
-            sides = [range_text(values[np.isfinite(values)]) for values in sides]
+            parts = (found[f"stiffness_{part}"].values for part in ("inside", "outline"))
+            sides = [range_text(values[np.isfinite(values)]) for values in parts]
             shares = (found.stiffness_inside / membrane).values
             ratio = f"{np.nanmedian(shares):.3g}" if np.isfinite(shares).any() else ""
             rows.append([best, mesh_type, material, f"{1e3 * size:.4g} mm", *sides, ratio,
