@@ -387,7 +387,7 @@ class TestDatasets:
         mesh = plate_file(tmp_path, "med", "med", {})
         with h5py.File(mesh, "r+") as file:
             names: list[str] = []
-            file.visit(lambda one: names.append(one) if one.endswith("NOE/COO") else None)
+            file.visit(lambda one: names.append(one) if one.endswith("/COO") else None)
             [name] = names
             shape = file[name].shape
             del file[name]
