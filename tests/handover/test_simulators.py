@@ -231,6 +231,22 @@ def test_accelerations_beyond_those_of_mujoco_start_nothing_anew(tmp_path):
     assert data.time > 0 and np.abs(data.qpos - positions).max() < 1e-4 * np.abs(positions).max()
 
 
+def test_a_large_net_has_its_frequencies_by_multigrid(monkeypatch, tmp_path):
+    """A direct factor of a large tangent would take more memory than there may be."""
+    before = written(scene(), tmp_path, ".xml")
+
+    def factor(self, matrix):
+        raise AssertionError("a direct factor")
+
+    for name in ("MULTIGRID_FROM_UNKNOWNS", "NO_CHOLESKY_FROM_UNKNOWNS"):
+        monkeypatch.setattr(f"springtune.mechanics.network.{name}", 0)
+    for name in ("_superlu", "_cholesky"):
+        monkeypatch.setattr(f"springtune.mechanics.network.Network.{name}", factor)
+    numbers = [np.array(re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text), float)
+               for text in (before, written(scene(), tmp_path, ".xml"))]  # fmt: skip
+    assert numbers[0] == pytest.approx(numbers[1], rel=1e-5, abs=1e-9)
+
+
 def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
     net = SpringNet.from_mesh(st.make_mesh(BEAM, "free", "5 mm"), STEEL, "lattice", errors=False)
     for ending in PROGRAMS:

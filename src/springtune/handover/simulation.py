@@ -144,7 +144,7 @@ def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -
     if size < 10:
         root = 1 / np.sqrt(mass)
         return float(np.sqrt(np.linalg.eigvalsh(root[:, None] * matrix.toarray() * root)[0]))
-    factor = network.rest_factor if displacements is None else network.factorize_matrix(matrix)
+    factor = network.rest_factor if displacements is None else network.factorize_tangent(displacements)
     inverse = LinearOperator((size, size), matvec=factor.solve, dtype=float)
     start = np.random.default_rng(0).standard_normal(size)
     (square,) = eigsh(matrix, 1, diags_array(mass), sigma=0.0, OPinv=inverse, v0=start, return_eigenvectors=False)

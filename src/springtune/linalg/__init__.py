@@ -1,1 +1,4 @@
 """Linear algebra: sparse factorizations, their orders of elimination, and multigrid."""
+
+SOLVERS = ("Cholesky", "SuperLU", "multigrid")
+"""Names of linear solvers."""

@@ -105,11 +105,10 @@ def smoother(matrix: Blocks) -> Chunks:
     if (xx < 0).any() or (yy < 0).any() or ((xx * yy <= xy * xy) & ((xx * yy > 0) | (xy != 0))).any():
         raise LinAlgError("a particle or node without stiffness")
     xx, yy = xx + added[:, 0], yy + added[:, 1]
-    # What is held has zeros, and a 1 instead gives zeros again.
-    area = np.where(xx > 0, xx, 1.0) * np.where(yy > 0, yy, 1.0) - xy * xy
-    x, y = np.where(xx > 0, np.where(yy > 0, yy, 1.0), 0.0), np.where(yy > 0, np.where(xx > 0, xx, 1.0), 0.0)
-    inverse = np.stack([x / area, -xy / area, y / area], axis=1).astype(np.float32)
-    return chunks._replace(diagonal=inverse, rows_added=near, added=added[near].astype(np.float32))
+    # What is held has zeros, as its inverse has; a 1 stands for it in between.
+    one, other = np.where(xx > 0, xx, 1.0), np.where(yy > 0, yy, 1.0)
+    inverse = np.stack([(xx > 0) * other, -xy, (yy > 0) * one], axis=1) / (one * other - xy * xy)[:, None]
+    return chunks._replace(diagonal=inverse.astype(np.float32), rows_added=near, added=added[near].astype(np.float32))
 
 
 def first_grid(points: np.ndarray, coarsening: float) -> Grid:

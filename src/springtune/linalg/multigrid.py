@@ -90,7 +90,7 @@ class Multigrid:
         besides: csr_array | None = None,
     ) -> None:
         self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
-        self._places = np.flatnonzero(~held)
+        self._held, self._places = held, np.flatnonzero(~held)
         self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
@@ -111,7 +111,7 @@ class Multigrid:
 
     def _coarsened(self) -> tuple[np.ndarray, Any]:
         """Lay levels down to the coarsest one, whose unknowns and dense factor are returned."""
-        matrix, size = self._matrix, int(len(self._places))
+        matrix, size = self._matrix, len(self._places)
         # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
         # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
         if not (matrix.diagonal[:, ::2].ravel()[self._places] > 0).all():
@@ -233,9 +233,7 @@ class Multigrid:
     def _check_particles(self) -> None:
         """Refuse a matrix with a particle that moves without stiffness: all its springs are in one line."""
         xx, xy, yy = self._matrix.diagonal.T
-        free = np.zeros(self._points.shape, dtype=bool)
-        free.ravel()[self._places] = True
-        product = np.where(free[:, 0], xx, 1.0) * np.where(free[:, 1], yy, 1.0)
+        product = np.where(self._held[:, 0], 1.0, xx) * np.where(self._held[:, 1], 1.0, yy)
         if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
             raise SingularError("a particle is free to move: its springs, if any, are in one line")
 

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_array
 
+from ..linalg import SOLVERS
 from ..linalg.blocks import Blocks
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
 from ..mesh.cells import Mesh
@@ -128,6 +129,8 @@ class Network:
         like: "Network | None" = None,
         solver: str | None = None,
     ) -> None:
+        if solver not in (None, *SOLVERS):  # a wrong name would be SuperLU's
+            raise ValueError(f"unknown solver '{solver}'; known: {', '.join(SOLVERS)}")
         self.solver = solver
         self.mesh = mesh
         self.held = held
@@ -377,7 +380,7 @@ class Network:
         return ""
 
     def factorize_matrix(self, matrix: csc_array, symmetric: bool = True) -> Factor:
-        """Factorize a matrix over the unknowns with the tangent's sparsity, such as a sum of `stiffness_of`."""
+        """Factorize a matrix with the tangent's sparsity, such as a sum of `stiffness_of`, by a direct solver."""
         if symmetric and self._by_cholesky:
             factor = self._cholesky(matrix)
             if factor is not None:

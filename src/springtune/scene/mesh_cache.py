@@ -190,7 +190,7 @@ class MeshCache:
     def typical_stiffness(self, springs: Springs) -> dict[str, float]:
         """Stiffness of springs at rest [N/m]: medians inside and on the outline, the least and the most.
 
-        NaN where there are none. The last ones are kept over the reference stiffness.
+        A median of no springs is NaN. The last ones are kept over the reference stiffness.
         """
         sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
         if self._typical is None or self._typical[0] is not sizes:
@@ -198,7 +198,7 @@ class MeshCache:
             inside, around = sizes[~outline], sizes[outline]
             found = {"inside": np.median(inside) if len(inside) else np.nan}
             found |= {"outline": np.median(around) if len(around) else np.nan}
-            found |= {"least": sizes.min(initial=np.inf), "most": sizes.max(initial=-np.inf)}
+            found |= {"least": sizes.min(), "most": sizes.max()}
             self._typical = sizes, found
         return {name: float(springs.reference * value) for name, value in self._typical[1].items()}
 

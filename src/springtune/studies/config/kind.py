@@ -39,7 +39,6 @@ class Output:
     plot: str = ""  # function that yields stem, plotting function and selection of each figure of a tree
     job: str = ""  # outputs may share a job; by default each has its own
     tables: Callable[[Study], Iterable[str]] = lambda study: []  # file names
-    texts: dict[str, str] = field(default_factory=dict)  # functions from a tree to a text, by file name
     write: str = ""  # function of a tree and a folder that writes the tables and returns their names
     into: str = "tables"  # folder of the tables
     page: bool = False  # whether it is the page of all tables

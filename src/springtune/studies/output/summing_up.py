@@ -43,9 +43,8 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
     rows = [[what, str(sum(found.values())), _count_words(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
     if ROOT_GROUP in groups:
-        for part in (_errors(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP), most),
-                     _stiffness_to_type(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP))):  # fmt: skip
-            lines += part
+        root, finite = groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP)
+        lines += [*_errors(root, finite, most), *_stiffness_to_type(root, finite)]
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
