@@ -11,8 +11,6 @@ from pathlib import Path
 import pytest
 
 import springtune
-from springtune.mesh import mesh_type
-from springtune.springs import definition
 
 from tables import STUDIES
 
@@ -26,20 +24,6 @@ RECIPES = {
 
 
 STUDY = STUDIES["places"]
-
-
-class TestOutsideThePackage:
-    """A file of one's own, imported: the same decorator, nothing else."""
-
-    @pytest.mark.parametrize(
-        ("declare", "name"), [(definition, "lattice"), (mesh_type, "structured")], ids=["definition", "mesh type"]
-    )
-    def test_a_name_that_is_taken_is_refused(self, declare, name):
-        with pytest.raises(ValueError, match=rf"'{name}' is springtune\..* already; choose another name for .*other"):
-
-            @declare(name)
-            def other(*_):
-                """Not to be."""
 
 
 REPORT = """

@@ -251,16 +251,6 @@ def test_files_run_at_the_setting_or_are_refused(tmp_path):
             fit.net().write(tmp_path / name)
 
 
-def test_a_scene_that_no_engine_runs_is_refused():
-    with pytest.raises(st.EngineError, match="kinematics: 'linear', and engines keep the length law"):
-        st.fit_engine(strip(kinematics="linear"), "xpbd")
-    light = st.Scene(BASE.beam, BASE.mesh, st.Material("1 MPa", 0.3), "traction", "0.2 N")
-    with pytest.raises(ValueError, match="density: material 'material' has none; give a density"):
-        st.fit_engine(light, "xpbd")
-    with pytest.raises(KeyError, match="unknown engine 'xpdb'"):
-        st.fit_engine(BASE, "xpdb")
-
-
 def test_an_absent_engine_is_refused_with_the_command_that_installs_it(engine):
     st.ENGINES.discard("late")
     st.engine("late", needs=("no_such_program",), extra="newton")(engine)

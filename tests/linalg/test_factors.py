@@ -425,11 +425,6 @@ def test_an_unsymmetric_tangent_that_gradients_do_not_solve_goes_to_superlu():
     assert np.abs(tangent @ factor.solve(right) - right).max() <= 1e-8
 
 
-def test_an_unknown_solver_is_refused():
-    with pytest.raises(ValueError, match="unknown solver 'LU'; known: Cholesky, SuperLU, multigrid"):
-        problem_on(MESH_TYPES["structured"](0.1, 0.04, 1e-2), solver="LU")
-
-
 def test_newton_goes_on_in_steps_where_multigrid_meets_an_unstable_tangent():
     mesh = MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
     problem = problem_on(mesh, solver="multigrid")

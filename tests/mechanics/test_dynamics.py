@@ -413,25 +413,6 @@ def test_a_thread_that_fails_ends_the_others(broken):
     stepper.close()
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: beam().run("central-difference", 1e-9, 1, threads=0), "threads: 0 is not a whole number above zero"),
-        (lambda: beam().run("central-difference", 1e-9, 1, precision="float16"), "'float16'; known: float64, float32"),
-        (lambda: beam().run("implicit-midpoint", 1e-9, 1, threads=2), "its steps in double precision and one thread"),
-        (lambda: beam().run("backward-euler", 1e-9, 1, precision="float32"), "takes its steps in double precision"),
-        (lambda: beam("delingette").run("central-difference", 1e-9, 1, threads=2), "with energies moves in one; give"),
-        (lambda: oscillator().run("leapfrog", 0.1, 1), "known: symplectic-euler"),
-        (lambda: oscillator().run("symplectic-euler", 0.0, 1), "above zero"),
-        (lambda: oscillator(mass_damping=-1.0), "negative"),
-        (lambda: Motion(beam().network, 0 * beam().inertia[:, 0]), "have no mass"),
-    ],
-)  # fmt: skip
-def test_what_a_scheme_has_not_is_refused(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
-
-
 class Counted(Network):
     """A network that counts the matrices that it factorizes."""
 

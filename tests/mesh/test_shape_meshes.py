@@ -18,8 +18,6 @@ from springtune.mesh.sheets import outline_of, sheet_fault
 from springtune.problem.boundary import check_case
 from springtune.problem.shapes import Hole, LoadCase, Segment, Shape, Support, Traction
 
-from tables import refused_objects
-
 
 def plate(**more):
     holes = [Hole.circle((0.05, 0.02), 0.008), Hole.circle((0.02, 0.02), 0.005, part="core")]
@@ -393,20 +391,6 @@ def test_a_sheet_without_any_of_its_cells_is_a_sheet_unless_cells_meet_in_a_poin
 
 def pull(*supports, at="right", **more):
     return LoadCase("pull", supports, [Traction(at, (1, 0))], **more)
-
-
-@pytest.mark.parametrize(("code", "says"), refused_objects("load cases"))
-def test_load_cases_are_held_against_the_mesh(code, says):
-    case = eval(code)
-    made = mesh_shape(plate(points={"tip": (0.1, 0.021), "also": (0.1, 0.03), "corner": (0, 0)}), 5e-3)
-    points = {**made.points, "between": np.array([0.0321, 0.0123]), "away": np.array([0.05, 0.02])}
-    grouped = GroupedMesh(made.mesh, made.sides, points, made.parts)
-    if says:
-        with pytest.raises(ValueError) as caught:
-            check_case(grouped, case)
-        assert str(caught.value).startswith("load 'pull'") and says in str(caught.value)
-    else:
-        check_case(grouped, case)
 
 
 def test_each_body_is_to_be_held():

@@ -7,19 +7,15 @@ import numpy as np
 import pytest
 
 import springtune as st
-from counting import counted
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
-from springtune.mesh.types import MeshType
 from springtune.prediction.choices import USUAL_LOADS, predict, predicted, references
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
-from springtune.scene.boundary_problem import unit_reference
-from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS, DefinitionError
 
 from problems import pulled
@@ -242,32 +238,6 @@ class TestLoads:
         choices = predict(beam, mesh, material, loads=["compression", "traction"])
         assert [list(choice.errors) for choice in choices] == [["compression", "traction"]] * len(choices)
         assert all(choice.errors["compression"] == -choice.errors["traction"] for choice in choices)
-
-
-class TestBodies:
-    @pytest.mark.parametrize(
-        ("sides", "why"),
-        [
-            ((1e-12, 1e-12), "is 1e-09 mm long, which no beam is; give 1e-06 to 1e.10 mm, or correct its unit"),
-            ((1e9, 1e9), "mm long, which no beam is"),
-            ((1.0, 1e-10), "mm high, which no beam is"),
-            ((1.0, 0.1, 1e-12), "mm thick, which no beam is"),
-            ((1e3, 1e-3), "one side is 1e.06 times the other, and at most 10000 times has a reference; such shapes"),
-            ((1e-3, 1e3), "one side is 1e.06 times the other"),
-        ],
-    )
-    def test_that_are_none_are_refused_at_once(self, sides, why):
-        beam, material = Beam(*sides, name="odd"), Material(1e9, 0.3)
-        mesh = MESH_TYPES["right"](0.1, 0.02, 5e-3)
-        for call in (
-            lambda: predict(beam, mesh, material),
-            lambda: references(beam, material),
-            lambda: st.find_mesh(beam, material, "1 %"),
-        ):
-            with counted(unit_reference, MeshType.__call__, MeshCache.__init__) as calls:
-                with pytest.raises(ValueError, match=f"^beam 'odd': .*{why}"):
-                    call()
-            assert not calls
 
 
 def materials_of(random):

@@ -240,10 +240,3 @@ class TestArguments:
         ):
             find_mesh(BEAM, STEEL, "1e-05 %")
         assert not calls  # nothing is solved but the references
-
-    def test_a_load_without_reference(self):
-        """The most slender beam that is one."""
-        with pytest.raises(
-            ValueError, match="^loads: 'bending' has no reference, so .* such slender shapes are for beam"
-        ):
-            find_mesh(st.Beam(10.0, 1e-3), st.Material(1e9, 0.5), "1 %", loads=["traction", "bending"])

@@ -6,11 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-import springtune as st
 from springtune.mesh.sides import OutlineSide
-from springtune.problem.shapes import Hole, Segment, Shape, Traction
-
-from tables import refused_objects
+from springtune.problem.shapes import Hole, Segment, Shape
 
 ORIGIN = (0.0, 0.0)
 
@@ -122,25 +119,3 @@ def test_what_a_shape_measures_is_its_label():
     assert bulge.extent == ((0, 0), pytest.approx((0.5 + math.sqrt(0.5), 1)))
     own = Shape("own", "1 mm", file="own.msh", unit="1 mm")
     assert own.label == "own" and own.rounds == () and math.isnan(own.area) and own.unit == 1e-3
-
-
-def circle(*place):
-    return Hole.circle(place[:2], place[2])
-
-
-def shape(*corners, **arcs):
-    return Shape("a", 1, outline(*corners, **arcs))
-
-
-def plate(**parts):
-    return Shape.rectangle(1, 1, **parts)
-
-
-PULL = [Traction("right", (1, 0))]
-
-
-@pytest.mark.parametrize(("code", "says"), refused_objects("shapes"))
-def test_what_is_no_shape_is_refused(code, says):
-    with pytest.raises(ValueError) as caught:
-        eval(code, globals() | {"st": st})
-    assert says in str(caught.value)

@@ -20,11 +20,9 @@ from springtune.mesh import (
     Mesh,
     MeshError,
     braced,
-    isosceles,
     lattice,
     read_beam_mesh,
     right,
-    structured,
 )
 from springtune.mesh.formats import read_shape
 from springtune.studies.output.browse.page import page
@@ -71,19 +69,6 @@ def test_a_mesh_file_that_cannot_be_meant_is_an_error_of_the_study(tmp_path, fau
     (tmp_path / "study.yaml").write_text(text + "mesh_files: {own: [{file: own.vtu, beam: a, mesh_size: 5 mm}]}\n")
     with pytest.raises(st.StudyError, match=rf"mesh_files\.own\[0\]\.file: .*own\.vtu': {fault}.*; give"):
         st.load_study(tmp_path / "study.yaml")
-
-
-@pytest.mark.parametrize("make", [structured, right, *MESH_TYPES.values(), lambda *box: isosceles(*box, 0.3)])
-@pytest.mark.parametrize(
-    "box",
-    [
-        (0.12, 0.025, -0.001), (0.12, 0.025, 0.0), (0.12, 0.025, np.nan), (np.inf, 0.025, 0.005), (-0.12, 0.025, 0.005),
-        (0.12, 0.025, 1e-9), (0.12, 0.025, 1e308), (1e-308, 0.02, 0.005), ("120 mm", 0.025, 0.005), (0.12, True, 0.005),
-    ],
-)  # fmt: skip
-def test_no_mesh_is_made_of_a_box_that_is_none(make, box):
-    with pytest.raises(MeshError, match="(length|height|size): .*; give"):
-        make(*box)
 
 
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -149,47 +134,6 @@ def test_a_scene_and_a_prediction_are_of_a_beam_that_is_filled(call):
 
 
 MESH = st.make_mesh(BEAM, "structured", "5 mm")
-
-
-def scene(**changed):
-    given = {"beam": BEAM, "mesh": MESH, "material": STEEL, "load": "traction", "force": "1 kN"} | changed
-    return st.Scene(**given)
-
-
-ODD = [np.nan, np.inf, -1, 0, None, "x", [], {}, np.zeros((0, 2)), True, b"1", 10**400, 1 + 2j, object()]
-
-CALLS = {
-    "length": lambda odd: st.Beam(odd, 1.0),
-    "thickness": lambda odd: st.Beam(1.0, 1.0, odd),
-    "modulus": lambda odd: st.Material(odd, 0.3),
-    "ratio": lambda odd: st.Material(1.0, odd if odd != 0 else 0.6),
-    "density": lambda odd: st.Material(1.0, 0.3, "" if odd is None else odd),
-    "size": lambda odd: st.make_mesh(BEAM, "free", odd),
-    "mesh type": lambda odd: st.make_mesh(BEAM, odd, "5 mm"),
-    **{name: lambda odd, name=name: scene(**{name: odd})
-       for name in ("beam", "mesh", "material", "load", "force", "definition", "kinematics")},
-    "stiffness": lambda odd: scene(definition="paper", stiffness=odd),
-    "sheet": lambda odd: scene(sheet=odd if odd is not None else 1),
-    "curve": st.sensitivity,
-    "ratios": lambda odd: st.sensitivity(scene(), [] if odd is None or odd is True or odd == b"1" else odd),
-    "moduli": lambda odd: st.moduli(MESH, STEEL, odd),
-    "moduli's mesh": lambda odd: st.moduli(odd, STEEL, "lattice"),
-    "prediction": lambda odd: st.predict(BEAM, odd, STEEL),
-    "springs": lambda odd: st.DEFINITIONS["lattice"].springs(MESH, STEEL, odd),
-    "stated": lambda odd: st.DEFINITIONS["paper"].springs(MESH, STEEL, 1e-3, odd),
-    "cases": lambda odd: st.DEFINITIONS["annealed"].springs(MESH, STEEL, 1e-3, odd),
-    "reference": lambda odd: st.Springs(odd if not isinstance(odd, int) or odd < 10**300 else 0, np.ones(3)),
-    "name of a definition": lambda odd: st.definition(odd if odd != "x" else "")(lambda *scene: None),
-    "name of a mesh type": lambda odd: st.mesh_type(odd if odd != "x" else "")(lambda length, height, size: None),
-    "field": st.field,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", CALLS)
-@pytest.mark.parametrize("odd", ODD, ids=lambda odd: repr(odd)[:12])
-def test_odd_arguments_are_refused_by_a_message(name, odd):
-    with pytest.raises(ValueError, match=".{12,}"):
-        CALLS[name](odd)
 
 
 def test_an_instability_of_the_patch_test_is_a_failed_scene():

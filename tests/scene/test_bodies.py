@@ -123,29 +123,6 @@ def holed(radius, *, outline=True, part=""):
 class TestMeshOfAnotherShape:
     """The reference is on the outline of the shape: a mesh of another one would be compared with it."""
 
-    @pytest.mark.parametrize("part", ["", "core"])
-    def test_other_radius(self, part):
-        grouped = st.mesh_shape(holed(0.015, part=part), "4 mm")
-        materials = {"": STEEL} | ({part: THIRD} if part else {})
-        with pytest.raises(ValueError, match="particle at .* on no side of shape 'plate'; mesh it with"):
-            st.Scene(holed(0.008, part=part), grouped, materials, "push", definition="delingette")
-
-    def test_no_hole(self):
-        full = st.Shape.rectangle(0.1, 0.04, loads=holed(0.01).loads, name="full")
-        with pytest.raises(ValueError, match="has no edge on the side of shape 'plate' from"):
-            st.Scene(holed(0.008), st.mesh_shape(full, "4 mm"), STEEL, "push", definition="delingette")
-
-    def test_group_or_point_elsewhere(self):
-        shape = holed(0.008)
-        grouped = st.mesh_shape(shape, "4 mm")
-        for wrong in (grouped.sides["left"], grouped.sides["right"][:3]):
-            other = replace(grouped, sides={**grouped.sides, "right": wrong})
-            with pytest.raises(ValueError, match="its group 'right' is not the sides 'right' of shape 'plate'"):
-                st.Scene(shape, other, STEEL, "push", definition="delingette")
-        moved = replace(grouped, points={"tip": np.array([0.1, 0.03])})
-        with pytest.raises(ValueError, match=r"its point 'tip' is at \(100, 30\) mm, that of shape 'plate' at"):
-            st.Scene(shape, moved, STEEL, "push", definition="delingette")
-
     @pytest.mark.parametrize(("size", "refined"), [(0.02, {}), (2e-3, {"hole": 5e-4})])
     def test_its_own_mesh_however_coarse_is_taken(self, size, refined):
         outline = (
@@ -159,18 +136,6 @@ class TestMeshOfAnotherShape:
         shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": pulled(1.0, 0.0)})
         steel = {"ring": STEEL, "": STEEL}
         assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), steel, "pull", definition="lattice")
-
-
-def test_sides_of_one_s_own_are_sides():
-    """A pressure on edges the wrong way round would pull; on edges inside it would act on nothing that there is."""
-    shape = holed(0.008, outline=False)
-    grouped = st.mesh_shape(holed(0.008), "4 mm")
-    turned = replace(grouped, sides={name: edges[:, ::-1] for name, edges in grouped.sides.items()})
-    with pytest.raises(ValueError, match="load 'push': 'upper' has edges with the body on their right"):
-        st.Scene(shape, turned, STEEL, "push", definition="delingette")
-    inner = replace(grouped, sides={**grouped.sides, "right": grouped.mesh.edges[~grouped.mesh.on_outline][:2]})
-    with pytest.raises(ValueError, match="load 'push': 'right' has edges that are not on the outline"):
-        st.Scene(shape, inner, STEEL, "push", definition="delingette")
 
 
 def test_scenes_that_share_a_sheet_have_groups_of_their_own():

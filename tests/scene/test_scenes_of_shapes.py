@@ -24,7 +24,6 @@ from springtune.problem.geometry import AssumptionWarning
 from springtune.springs import DEFINITIONS
 
 from problems import free_network
-from tables import refused_objects
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("210 GPa", 1 / 3, name="third")
@@ -34,7 +33,6 @@ LENGTH, HEIGHT = 0.1, 0.04
 ROLLERS = (st.Support("left", x=0.0), st.Support("lower", y=0.0))
 CLAMP = (st.Support("left", x=0.0, y=0.0),)
 END = st.Quantity("end", "displacement", "right", "x")
-BEAM = st.Beam("100 mm", "40 mm"), st.make_mesh(st.Beam("100 mm", "40 mm"), "right", "10 mm"), STEEL
 
 
 def plate(*cases, points=None, holes=()):
@@ -397,40 +395,6 @@ class TestMaterials:
         assert values["end"] == pytest.approx(stress * compliance[0, 0] * LENGTH, rel=1e-9)
         assert values["v"] == pytest.approx(stress * compliance[0, 1] * 0.02, rel=1e-9)
         assert values["xx"] == pytest.approx(stress, rel=1e-9)
-
-
-class TestRefusals:
-    """Each names what is wrong, and what there is."""
-
-    traction = st.Traction("right", (1e3, 0.0))
-    pull = load(tractions=[traction])
-    shape = plate(pull)
-    grouped = st.mesh_shape(shape, 8e-3)
-
-    def scene(self, *loads, grouped=None, material=STEEL, name="pull", **options):
-        shape = plate(*loads) if loads else self.shape
-        return st.Scene(shape, grouped or self.grouped, material, name, **options)
-
-    def held(self, *supports, name="right", **points):
-        """A scene under the traction on a side, by other supports."""
-        case = load(supports=supports, tractions=[st.Traction(name, (1e3, 0.0))])
-        grouped = GroupedMesh(self.grouped.mesh, self.grouped.sides, points)
-        return st.Scene(plate(case, points=points), grouped, STEEL, "pull")
-
-    @pytest.mark.parametrize(("code", "message"), refused_objects("scenes of shapes"))
-    def test_of_scenes(self, code, message):
-        with pytest.raises(ValueError, match=message):
-            eval(code, globals() | {"s": self})
-
-    @pytest.mark.parametrize("name", [name for name, one in DEFINITIONS.items() if one.uniaxial])
-    def test_of_definitions_for_beams_alone(self, name):
-        with pytest.raises(ValueError, match=f"{name}.* is for loads that stretch a beam"):
-            self.scene(definition=name)
-
-    def test_of_quantities(self):
-        grouped = GroupedMesh(self.grouped.mesh, points={"out": np.array([0.2, 0.0])})
-        with pytest.raises(ValueError, match=r"'out' at \(200, 0\) mm is outside of the mesh"):
-            cell_at(grouped, "out")
 
 
 class TestAgainstReferences:

@@ -11,11 +11,8 @@ from periodic import affine_stiffness
 from springtune.mechanics.moduli import PatchTest
 from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh
-from springtune.prediction.choices import predict
-from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnisotropicMaterial, Material, Rubber
 from springtune.scene.moduli import moduli
-from springtune.scene.single import Scene
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.parts import derive_by_parts
 
@@ -367,28 +364,6 @@ def test_strips_of_two_materials_have_the_moduli_of_both(name, mesh, axis, main,
     springs = derived(name, halves(mesh, axis), main, far)
     young, ratio = PatchTest(mesh).axial(springs)
     assert (young * springs.reference / THICKNESS, ratio) == pytest.approx(moduli, abs=1e-8)
-
-
-def test_definitions_that_know_one_body_refuse_parts():
-    grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
-    two = {"": Material(1.0, 0.3), "far": Material(2.0, 0.3)}
-    with pytest.raises(DefinitionError, match="is told stiffness and the body has 2 materials; choose"):
-        derive_by_parts(DEFINITIONS["paper"], grouped, two, THICKNESS, 1e6)
-    with pytest.raises(DefinitionError, match="is told what the whole body does"):
-        derive_by_parts(DEFINITIONS["evolved"], grouped, two, THICKNESS, [1])
-    with pytest.raises(DefinitionError, match="on 'far': needs an isotropic material and 'board' is anisotropic"):
-        derive_by_parts(DEFINITIONS["lattice"], grouped, two | {"far": BOARD}, THICKNESS)
-
-
-def test_beams_refuse_what_is_not_isotropic_by_name():
-    beam = Beam("100 mm", "20 mm")
-    mesh = MESH_TYPES["right"](0.1, 0.02, 5e-3)
-    with pytest.raises(ValueError, match="material: 'board' is anisotropic, and beams are of isotropic ones.*Shape"):
-        Scene(beam, mesh, BOARD, "traction", "1 kN")
-    with pytest.raises(ValueError, match="material: 'ply' is anisotropic, and beams are of isotropic ones.*Shape"):
-        predict(beam, mesh, PLY)
-    with pytest.raises(DefinitionError, match="definition 'lattice': needs an isotropic material and 'ply' is"):
-        moduli(mesh, PLY, "lattice")
 
 
 def test_rubber_of_two_tests_in_one_body_keeps_the_law_and_the_range_of_each():

@@ -231,18 +231,6 @@ def test_what_is_no_test_is_refused_by_its_line(text, words, tmp_path):
     assert words in str(caught.value) and "test.csv" in str(caught.value)
 
 
-def test_another_material_and_terms_are_refused():
-    mesh = springtune.make_mesh(springtune.Beam("100 mm", "20 mm"), "structured", "5 mm")
-    with pytest.raises(springtune.DefinitionError, match="'cork' is none; give springtune.fit_rubber"):
-        DEFINITIONS["yeoh"].springs(mesh, springtune.Material("1 MPa", 0.5, name="cork"), 1e-3)
-    with pytest.raises(ValueError, match="terms: 4"):
-        fit_rubber(TRELOAR / "uniaxial.csv", terms=4)
-    with pytest.raises(ValueError, match="terms: 0"):
-        SpringLaw.fitted(TRELOAR / "uniaxial.csv", 0)
-    with pytest.raises(TestDataError, match="needs? more|need more than"):
-        SpringLaw.fitted(TensileTest(np.array([1.5, 3.0, 4.0, 5.0]), np.array([1.0, 2, 3, 4])), 1)
-
-
 RATIOS = (0.5, 0.4999, 0.45, 0.3, 0.0, -0.5)
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 

@@ -39,13 +39,6 @@ def refused_calls(name):
     return [pytest.param(shlex.split(call), *told, id=call) for call, *told in rows]
 
 
-def refused_objects(name):
-    """Code of calls of the library that are refused, what is said of each, and its id."""
-    rows = yaml.safe_load((HERE / "refused_objects.yaml").read_text())[name]
-    named = rows.items() if isinstance(rows, dict) else ((code, (code, says)) for code, says in rows)
-    return [pytest.param(*row, id=name) for name, row in named]
-
-
 def refused_numbers(name):
     """Texts in the place of numbers, which a command refuses."""
     return yaml.safe_load((HERE / "refused_calls.yaml").read_text())[name]

@@ -199,36 +199,6 @@ def test_an_engine_carries_its_least_errors_over_the_time_of_a_frame(tree):
     assert line.get_xdata() == pytest.approx([1e3 * here.frame_seconds[best].item()])
 
 
-# -- what is refused ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("plot", "group", "selection", "said"),
-    [
-        (st.plot_sensitivity, "/", SCENES, "choose one beam: '100x20', '200x40'"),
-        (st.plot_benchmark, "/", {}, "choose one scene: 'traction', 'bending'"),
-        (
-            st.plot_size,
-            "/",
-            SCENES | {"load": "torsion"},
-            "nothing has load 'torsion'; there is 'traction', 'compression',",
-        ),
-        (st.plot_deformed, "fields", {}, "give the whole dataset"),
-        (st.plot_block, "fields", {}, "give the whole dataset"),
-        (st.plot_laying, "moduli", {}, "no group '/laying'; it has '/moduli'"),
-        (st.plot_stability_maps, "stability", {}, "no experiment 'maps'; it has 'limits', 'rest'"),
-    ],
-)
-def test_a_refused_plot_names_what_there_is(tree, plot, group, selection, said):
-    data = tree if group == "/" else tree[group].to_dataset()
-    if group == "moduli":
-        data = xr.DataTree.from_dict({"/moduli": data})
-    if group == "stability":
-        data = data.sel(experiment=["limits", "rest"])
-    with pytest.raises(ValueError, match=said):
-        plot(data, **selection)
-
-
 # -- the stage ---------------------------------------------------------------------------------------------------------
 
 
