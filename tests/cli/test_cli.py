@@ -1,11 +1,8 @@
 """The command line, the schema of studies and their manual."""
 
-import io
 import json
 import re
 import runpy
-import shlex
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -15,22 +12,18 @@ import yaml
 from click.testing import CliRunner
 
 import springtune
-from counting import counted
-from springtune.cli import COMMANDS, EscapedStream, main
+from springtune.cli import COMMANDS, main
 from springtune.handover.formats import NET_FORMATS
-from springtune.mesh import MESH_TYPES, write_mesh
-from springtune.mesh.types import MeshType
+from springtune.mesh import MESH_TYPES
 from springtune.prediction import choices as of_one_mesh
 from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
-from springtune.scene.boundary_problem import unit_reference
-from springtune.scene.mesh_cache import MeshCache
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.sections import schema_text
 from springtune.studies.kinds import load_study
 
-from tables import STUDIES, refused_calls, refused_numbers, run
+from tables import STUDIES, run
 
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `make docs`"
@@ -70,20 +63,6 @@ class TestAssumptions:
         assert told.count("warning: beam 'sheet': its longer side is 600 m, more than 100 m; check the unit") == 1
 
     @pytest.mark.parametrize(
-        ("asked", "said"),
-        [
-            (
-                "--beam 60x12 --thickness '1 km' --size '6 mm'",
-                "'60x12', thickness: 1e+06 mm exceeds its smaller side, 12 mm",
-            ),
-            ("--beam 200000x40000 --size '9000 mm'", "'200000x40000': its longer side is 200 m, more than 100 m"),
-        ],
-    )
-    def test_a_command_says_it_beside_its_answer(self, asked, said):
-        found = run("predict", "--material", "steel", *shlex.split(asked))
-        assert found.stderr.count(f"warning: beam {said}") == 1 and "recommended: " in found.stdout
-
-    @pytest.mark.parametrize(
         ("sides", "said"),
         [
             (("60 mm", "12 mm", "13 mm"), "'60x12', thickness: 13 mm exceeds its smaller side, 12 mm"),
@@ -118,37 +97,6 @@ def test_help_has_examples_that_name_real_commands_and_options(command):
             assert name in ([command] if command else COMMANDS)
             known = {option for one in main.get_command(None, name).params for option in one.opts}
             assert name == "run" or {word for word in arguments if word.startswith("--")} <= known
-
-
-def test_wrong_calls_exit_with_2():
-    assert run("no-such-command").exit_code == 2
-    assert run("predict").exit_code == 2 and "Missing option '--beam'" in run("predict").stderr
-    assert run("scenes", "--no-such-option").exit_code == 2
-
-
-class TestScenes:
-    def test_counts_of_the_papers_study(self):
-        result = run("scenes", CONFIG / "paper.yaml")
-        assert result.exit_code == 0
-        lines = words(result.stdout)
-        assert "scenes 360" in lines
-        assert "meshes 18 each serves 25 scenes and curves on average" in lines
-        assert "references 9 from 4 solutions: small strain scales with force, E t and size" in lines
-        assert any(line.startswith("curves 90 61 stiffnesses each") for line in lines)
-        assert "printed 45 cells to compare with" in lines
-        assert [line for line in lines if line.startswith("table ")] == [f"table {n} 54 54 9 3 18" for n in range(1, 6)]
-
-    def test_bad_study_is_one_message_and_exit_code_1(self, tmp_path):
-        path = tmp_path / "bad.yaml"
-        path.write_text((CONFIG / "quick.yaml").read_text().replace("length:", "lenght:", 1))
-        result = run("scenes", path)
-        assert result.exit_code == 1
-        assert result.stdout == ""
-        assert result.stderr == (
-            f"{path}:8: beams.100x20.lenght: unknown key 'lenght'; "
-            "did you mean 'length'? known: length, height, thickness\n"
-        )
-        assert [file.name for file in tmp_path.iterdir()] == ["bad.yaml"]
 
 
 def test_definitions_lists_all_with_summaries():
@@ -198,17 +146,6 @@ class TestSchema:
             validator.validate(yaml.safe_load(text.replace(old, new, 1)))
 
 
-@pytest.fixture(scope="module")
-def choices():
-    """Beam, material, references and choices of the command without its text."""
-    beam, material = Beam(0.1, 0.02), Material(210e9, 0.3, name="steel")
-    known = of_one_mesh.references(beam, material)
-    mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-    return beam, material, known, of_one_mesh.predict(beam, mesh, material, known)
-
-
-SAID = yaml.safe_load(Path(__file__).with_name("said.yaml").read_text())
-ABSURD = {name: refused_numbers(f"predict, absurd {name}") for name in ("beams", "sizes", "errors")}
 STEEL, RUBBER = ("--beam", "100x20", "--material", "steel"), ("--beam", "200x40", "--material", "rubber")
 
 
@@ -225,31 +162,6 @@ class TestPredict:
         worst = [max(abs(float(word)) for word in line.split(" %")[0:3] for word in word.split()[-1:]) for line in
                  list(rows.values())[1:]]  # fmt: skip
         assert worst == sorted(worst)
-
-    @pytest.mark.parametrize(("call", "said"), [(call, said) for call, *said in SAID])
-    def test_what_a_prediction_says(self, call, said, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        write_mesh("own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
-        result = run("predict", *shlex.split(call))
-        assert result.exit_code == 0 and not [part for part in said if part not in result.stdout], result.stdout
-
-
-@pytest.mark.parametrize(
-    ("table", "arguments", "messages"),
-    [
-        pytest.param(table, one.values[0], one.values[1:], id=one.id)
-        for table in ("predict", "predict, a mesh", "predict, an engine")
-        for one in refused_calls(table)
-    ],
-)
-def test_refused_predictions_are_one_line(table, arguments, messages, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "own.msh").write_text("")
-    body = {"predict": (), "predict, a mesh": STEEL, "predict, an engine": RUBBER}[table]
-    result = run("predict", *body, *arguments)
-    assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1
-    assert all(message in result.stderr for message in messages), result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
 
 
 class TestPredictAMesh:
@@ -314,42 +226,8 @@ class TestPredictAMesh:
         assert 1 / max(written["stiffness"]) == pytest.approx(least, rel=1e-4)
         assert 1 / min(written["stiffness"]) == pytest.approx(most, rel=1e-4)
 
-    def test_a_setting_without_a_factor_writes_nothing(self, tmp_path):
-        asked = [
-            *("--engine", "xpbd", "--beam", "200x40", "--size", "20 mm", "--material", "rubber", "--force", "0.2 N"),
-            *("--density", "1000 kg/m^3", "--load", "traction", "--definition", "lattice"),
-        ]
-        result = run("predict", *asked, "--write", tmp_path / "net.csv")
-        assert "in 4 orders of the same particles" in result.stdout and "take more substeps" in result.stdout
-        assert result.exit_code == 1 and not [*tmp_path.iterdir()]
-        assert result.stderr.startswith("Error: --write: there is no factor, so nothing is written: the error at dt")
-
     @pytest.mark.parametrize("command", ["predict", "springs"])
     def test_help_has_the_ending_of_every_format(self, command):
         said = run(command, "--help").stdout
         for ending in (*NET_FORMATS, ".xml", ".mjcf", ".py", ".newton.py", ".xpbd.json"):
             assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
-
-    @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
-    @pytest.mark.parametrize(
-        ("beam", "asked", "value"),
-        [
-            *((beam, *one) for beam in ABSURD["beams"] for one in (("--size", "5 mm"), ("--error", "5 %"))),
-            *(("100x20", "--size", size) for size in ABSURD["sizes"]),
-            *(("100x20", "--error", error) for error in ABSURD["errors"]),
-        ],
-    )
-    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, beam, asked, value):
-        """By one line each: no mesh, no reference, no network."""
-        with counted(MeshType.__call__, unit_reference, MeshCache.__init__) as calls:
-            result = run("predict", "--beam", beam, asked, value, "--material", "steel")
-        refusals = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
-        assert not calls and result.exit_code == 2 and result.stdout == "" and len(refusals) == 1
-        assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr
-
-
-def test_no_way_of_writing_leaves_control_characters():
-    stream = io.StringIO()
-    EscapedStream(stream).writelines(["red \x1b[31m\n"])
-    assert stream.getvalue() == "red \\x1b[31m\n"
-    assert not hasattr(EscapedStream(sys.stdout), "buffer")

@@ -10,7 +10,7 @@ import springtune as st
 from springtune.mesh import write_mesh
 from springtune.problem.compare import error_text
 
-from tables import STUDIES, refused_calls, run
+from tables import STUDIES, run
 
 SHAPES = Path(__file__).parents[2] / "config/shapes.yaml"
 
@@ -103,67 +103,3 @@ class TestSprings:
         assert run(*asked, "--material", "third", "--density", "1000 kg/m^3").exit_code == 0
         net = st.SpringNet.read(tmp_path / "net.json")
         assert net.masses.sum() == pytest.approx(1e-3 * 1e3 * 8e-4 * 0.94, rel=0.02)
-
-
-class TestError:
-    """`predict --error`."""
-
-    ASKED = ("predict", "--study", f"{SHAPES}:cook", "--material", "third", "--error", "3 %")
-
-    def test_it_says_what_it_found(self):
-        said = run(*self.ASKED[:-1], "10 %").stdout
-        assert said.startswith(
-            "cook, load shear; 48 x 60 mm, third, t = 1 mm; an error of at most 10 % in tip and edge"
-        )
-        assert "recommended: free " in said and "with springs alone: free " in said
-
-    @pytest.mark.parametrize(("options", "message"), refused_calls("predict, an error"))
-    def test_refusals(self, options, message):
-        result = run(*self.ASKED, *options)
-        assert result.exit_code == 2 and result.stderr.startswith(f"Error: {message}"), result.output
-
-    def test_what_has_no_mesh_or_no_reference_is_refused(self, here):
-        result = run("predict", *OWN, "--error", "1 %")
-        assert (
-            result.exit_code == 1 and "'own': has the mesh of its file, so there is none to be found" in result.stderr
-        )
-        result = run("predict", *PLATE[:-2], "--error", "1 %")
-        assert result.exit_code == 2
-        assert result.stderr == (
-            "Error: --load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out "
-            "of the quantities\n"
-        )
-        study = st.load_study("study.yaml")
-        with pytest.raises(ValueError, match="of beams alone"):
-            st.find_mesh(study.shape("plate"), study.material("steel"), "1 %", loads=["bending"])
-        with pytest.raises(ValueError, match="load: 'pull' is of shapes alone"):
-            st.find_mesh(st.Beam("40 mm", "20 mm"), study.material("steel"), "1 %", load="pull")
-
-
-BOTH = [
-    pytest.param([*command, *one.values[0]], one.values[1], id=f"{command[0]} {one.id}")
-    for command in (("predict",), ("springs", "--out", "net.csv"))
-    for one in refused_calls("shapes")
-]
-
-
-@pytest.mark.parametrize(("arguments", "message"), [*BOTH, *refused_calls("shapes, one command")])
-def test_refusals_are_one_line(arguments, message, here):
-    before = sorted(here.iterdir())
-    result = run(*arguments)
-    assert result.exit_code == 2 and message in result.stderr, result.output
-    assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
-
-
-@pytest.mark.parametrize("ending", [".xml", ".py", ".xpbd.json"])
-def test_follower_pressure_is_refused_by_simulators(ending, here, tmp_path):
-    asked = ("--study", "study.yaml:plate", "--load", "push", "--size", "4 mm", "--definition", "lattice")
-    result = run("springs", *asked, "--out", tmp_path / f"net{ending}")
-    assert "load 'push': turns with the side that it acts on" in result.stderr
-    assert "give its pressures 'follower: false'" in result.stderr and not [*tmp_path.iterdir()]
-
-
-def test_neither_a_beam_nor_a_shape(here):
-    for command in (("predict",), ("springs", "--out", "net.csv")):
-        result = run(*command)
-        assert result.exit_code == 2 and "Missing option '--beam' such as 200x40, or '--study'" in result.stderr

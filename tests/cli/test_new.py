@@ -14,7 +14,7 @@ from springtune.problem.loads import LOADS
 from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
-from tables import refused_calls, run
+from tables import run
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -116,12 +116,6 @@ class TestNew:
         Path("config/gone.yaml").symlink_to("nowhere")
         refused(run("new", "gone"), 1, "is there already")
 
-    @pytest.mark.parametrize(("given", "code", "said"), refused_calls("new"))
-    def test_names_that_cannot_be_are_told(self, checkout, given, code, said):
-        before = {path for path in checkout.rglob("*.yaml")}
-        refused(run("new", *given), code, said)
-        assert {path for path in checkout.rglob("*.yaml")} == before
-
 
 class TestRun:
     """What `springtune run` says before Snakemake starts; bad content is tests/workflow/test_bad_studies.py's."""
@@ -131,12 +125,6 @@ class TestRun:
         run("new", "one")
         run("new", "two")
         (checkout / "config/folder.yaml").mkdir()
-
-    @pytest.mark.parametrize(("arguments", "code", "said"), refused_calls("run"))
-    def test_a_study_that_is_none_is_told(self, arguments, code, said):
-        result = run("run", *arguments)
-        assert result.exit_code == code and said in result.stderr
-        assert "Traceback" not in result.stderr
 
     @pytest.fixture
     def called(self, monkeypatch):

@@ -17,9 +17,9 @@ from springtune.cli import main
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset, export
 
+from synthetic import SMALL_AXES as AXES
 from synthetic import dataset as every
-from tables import SMALL_AXES as AXES
-from tables import refused_calls, run
+from tables import run
 
 
 def refused(result, *said, code=1):
@@ -132,11 +132,6 @@ class TestInfo:
             assert line in lines, line
         assert any(line.startswith("/sensitivity 10 beam 2, mesh_type 2") for line in lines)
 
-    def test_what_is_no_dataset_is_told_in_one_line(self, tmp_path):
-        refused(run("info", tmp_path / "none"), "there is no such dataset")
-        (tmp_path / "text.nc").write_text("text")
-        refused(run("info", tmp_path / "text.nc"), "cannot be read")
-
 
 class TestExport:
     def test_one_row_a_cell_that_was_asked_for(self, path, tmp_path):
@@ -186,13 +181,6 @@ class TestExport:
         assert (tmp_path / "cells.csv").read_text() == "mine"
         assert run("export", path, "--to", tmp_path / "cells.csv", "--force").exit_code == 0
         assert len((tmp_path / "cells.csv").read_text().splitlines()) == 9
-
-    @pytest.mark.parametrize(("arguments", "said"), refused_calls("export"))
-    def test_refusals_name_what_there_is_and_leave_nothing(self, path, tmp_path, monkeypatch, arguments, said):
-        monkeypatch.chdir(tmp_path)
-        # What is asked for in a wrong way is told apart from what cannot be written.
-        refused(run("export", path, *arguments), *said, code=1 if said[0].startswith("folder") else 2)
-        assert not os.listdir(tmp_path)
 
     def test_what_is_not_installed_is_told_with_the_extra(self, path, tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, "pyarrow", None)

@@ -1,7 +1,6 @@
 """Springs as other programs get them: forces from a file alone, what its header says, and series for ParaView."""
 
 import json
-import os
 from dataclasses import replace
 
 import meshio
@@ -16,8 +15,6 @@ from springtune.cli import main
 from springtune.handover.newton import membrane
 from springtune.mechanics.energies import AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
-
-from tables import refused_calls
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 AS_STIFF = st.Rubber([35e9, -5e9, 1e9], density="7850 kg/m^3")
@@ -316,20 +313,6 @@ class TestCommand:
         assert "area terms of 205 cells of definition area" in result.stdout
         assert "error of the displacement, solved on this mesh: traction" in result.stdout
         assert "largest stable step of explicit integrators" in result.stdout
-
-    @pytest.mark.parametrize(("options", "said"), refused_calls("springs"))
-    def test_refuses_in_a_line_and_writes_nothing(self, options, said, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        (tmp_path / "file").write_text("no folder")
-        for name in ("folder.json", "folder.csv"):
-            (tmp_path / name).mkdir()
-        result = self.run(*self.STEEL, "--out", "net.csv", *options)
-        # What cannot be written is no mistake in how the command was called.
-        code = 1 if said.startswith("--out: f") else 2
-        assert result.exit_code == code and len(result.stderr.splitlines()) == 1, result.output
-        assert result.stderr.startswith(said) or said in result.stderr
-        assert sorted(os.listdir()) == ["file", "folder.csv", "folder.json"]
-        assert not os.listdir("folder.json") and not os.listdir("folder.csv")
 
 
 class TestPlaneStrain:

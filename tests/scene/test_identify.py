@@ -19,7 +19,7 @@ from springtune.reference.shapes import solve_shape
 from springtune.scene.identify import Model
 from springtune.scene.measured import blocks, body_of_test
 
-from tables import refused_calls, refused_files
+from tables import refused_files
 
 BEAM = st.Beam("100 mm", "20 mm")
 PLY = st.AnisotropicMaterial.orthotropic("14 GPa", "5 GPa", 0.3, "2 GPa", name="ply")
@@ -318,15 +318,3 @@ def test_the_command_prints_materials_that_a_study_takes(tmp_path, monkeypatch):
     found = st.load_study("mine.yaml").materials["measured"]
     assert found.young_modulus == pytest.approx(law.young_modulus, rel=0.02)
     assert found.poisson_ratio == pytest.approx(law.poisson_ratio, abs=0.05)
-
-
-@pytest.mark.parametrize(("arguments", "code", "message"), refused_calls("identify"))
-def test_a_wrong_call_says_what_to_give(tmp_path, monkeypatch, arguments, code, message):
-    monkeypatch.chdir(tmp_path)
-    Path("c.csv").write_text("force [N],displacement [um]\n0,0\n1,1\n2,2.1\n")
-    Path("strain.yaml").write_text(
-        template_text(Path("x"), "shape").replace("ratio: 0.3}", "ratio: 0.3, plane: strain}")
-    )
-    made = CliRunner().invoke(main, ["identify", *arguments])
-    assert made.exit_code == code, made.output
-    assert message in made.output

@@ -5,6 +5,10 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
+import springtune as st
+from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
+from springtune.studies.output import dataset as stored
+
 BEAMS, TYPES, SIZES = ["100x20", "200x40"], ["structured", "free"], [1e-3, 2e-3, 5e-3]
 MATERIALS, LOADS, DEFINITIONS = ["steel", "rubber"], ["traction", "compression", "pressure"], ["paper", "area"]
 SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
@@ -250,3 +254,40 @@ def _dataset():
     groups |= {"samples": samples, "sobol": sobol}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})
+
+
+SMALL_AXES = {
+    "beam": ("200x40", "100x20"), "mesh_type": ("structured", "free"), "mesh_size": (2e-3, 5e-3),
+    "material": ("steel",), "load": ("traction", "bending"), "definition": ("lattice", "patch"),
+    "kinematics": ("linear",), "stiffness_ratio": (0.5, 1.0, 1.5),
+}  # fmt: skip
+"""Labels of a small dataset of scenes and curves."""
+
+HELD = {
+    "displacement", "deformation_error", "field_error", "stiffness", "status", "message", "iterations", "residual",
+    "solve_seconds", "solver", "material_young_modulus", "beam_length", "beam_height", "beam_thickness", "force",
+    "reference_displacement", "best_stiffness", "curve_seconds",
+}  # fmt: skip
+"""Variables of the datasets that are compared."""
+
+ATTRIBUTES = {"study": "small", "springtune_version": "0", "config": "title: small\nbeams: 1\n"}
+
+
+def small(**axes):
+    """A study of scenes and curves in memory: numbers of their own, all solved."""
+    axes = SMALL_AXES | axes
+    root, curves = ROOT.empty(axes, HELD), SENSITIVITY.empty(axes, HELD)
+    for data in (root, curves):
+        for name, array in data.data_vars.items():
+            if array.dtype.kind == "f":
+                array.values[...] = 1e-3 * np.arange(1, array.size + 1).reshape(array.shape)
+            elif str(name).endswith("status"):
+                array.values[...] = st.Status.SOLVED
+    return xr.DataTree.from_dict({"/": root.assign_attrs(ATTRIBUTES), "/sensitivity": curves})
+
+
+def written(tree, path):
+    groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    groups["/"].attrs, attributes = {}, tree.attrs
+    stored.write(path, groups, attributes)
+    return path

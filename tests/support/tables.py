@@ -1,26 +1,13 @@
 """Studies, and calls and files that are refused, from the files of YAML beside; and how the command is called."""
 
-import shlex
 from pathlib import Path
 
-import pytest
 import yaml
 from click.testing import CliRunner
 
 from springtune.cli import main
 
 HERE = Path(__file__).parent
-SMALL_AXES = {
-    "beam": ("200x40", "100x20"),
-    "mesh_type": ("structured", "free"),
-    "mesh_size": (2e-3, 5e-3),
-    "material": ("steel",),
-    "load": ("traction", "bending"),
-    "definition": ("lattice", "patch"),
-    "kinematics": ("linear",),
-    "stiffness_ratio": (0.5, 1.0, 1.5),
-}
-"""Labels of a small dataset of scenes and curves."""
 STUDIES = yaml.safe_load((HERE / "studies.yaml").read_text())
 
 
@@ -31,17 +18,6 @@ def study_text(names, *changes):
         assert old in text, old
         text = text.replace(old, new, 1)
     return text
-
-
-def refused_calls(name):
-    """Words of calls of a command that are refused, what else `refused_calls.yaml` has of each, and its id."""
-    rows = yaml.safe_load((HERE / "refused_calls.yaml").read_text())[name]
-    return [pytest.param(shlex.split(call), *told, id=call) for call, *told in rows]
-
-
-def refused_numbers(name):
-    """Texts in the place of numbers, which a command refuses."""
-    return yaml.safe_load((HERE / "refused_calls.yaml").read_text())[name]
 
 
 def refused_files(name):

@@ -112,8 +112,3 @@ class TestCommand:
             result = CliRunner().invoke(main, ["browse", str(given)])
             assert (result.exit_code, result.stdout) == (0, f"{tmp_path}/index.html\n")
         assert opened == [f"{tmp_path}/index.html"] * 2
-
-    def test_where_none_is_it_is_refused_in_one_line(self, tmp_path):
-        result = CliRunner().invoke(main, ["browse", str(tmp_path)])
-        assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1 and result.stdout == ""
-        assert "index.html: there is no such page; run the study" in result.stderr

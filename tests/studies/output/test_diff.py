@@ -7,47 +7,18 @@ import pytest
 import xarray as xr
 
 import springtune as st
-from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
-from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare
 
 import synthetic
-from tables import SMALL_AXES as AXES
-from tables import refused_calls, run
+from synthetic import small as made
+from synthetic import written
+from tables import run
 
 SCENE = {
     "beam": "100x20", "mesh_type": "free", "mesh_size": 5e-3, "material": "steel", "load": "bending",
     "definition": "patch", "kinematics": "linear",
 }  # fmt: skip
 CURVE = {name: label for name, label in SCENE.items() if name != "definition"}
-HELD = {
-    "displacement", "deformation_error", "field_error", "stiffness", "status", "message", "iterations", "residual",
-    "solve_seconds", "solver", "material_young_modulus", "beam_length", "beam_height", "beam_thickness", "force",
-    "reference_displacement", "best_stiffness", "curve_seconds",
-}  # fmt: skip
-"""Variables of the datasets that are compared."""
-
-ATTRIBUTES = {"study": "small", "springtune_version": "0", "config": "title: small\nbeams: 1\n"}
-
-
-def made(**axes):
-    """A study of scenes and curves in memory: numbers of their own, all solved."""
-    axes = AXES | axes
-    root, curves = ROOT.empty(axes, HELD), SENSITIVITY.empty(axes, HELD)
-    for data in (root, curves):
-        for name, array in data.data_vars.items():
-            if array.dtype.kind == "f":
-                array.values[...] = 1e-3 * np.arange(1, array.size + 1).reshape(array.shape)
-            elif str(name).endswith("status"):
-                array.values[...] = st.Status.SOLVED
-    return xr.DataTree.from_dict({"/": root.assign_attrs(ATTRIBUTES), "/sensitivity": curves})
-
-
-def written(tree, path):
-    groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
-    groups["/"].attrs, attributes = {}, tree.attrs
-    dataset.write(path, groups, attributes)
-    return path
 
 
 def rows(found, name):
@@ -184,21 +155,3 @@ class TestCommand:
         assert result.exit_code == 0
         said = [" ".join(line.split()) for line in result.stdout.splitlines()]
         assert {"springtune_version 0 -> 1", "numpy none -> 3.0"} <= set(said)
-
-    @pytest.mark.parametrize(("arguments", "said"), refused_calls("diff"))
-    def test_trouble_is_2_and_one_line(self, arguments, said, troubled, monkeypatch):
-        monkeypatch.chdir(troubled)
-        result = run("diff", *arguments)
-        assert result.exit_code == 2 and not result.stdout and said in result.stderr, result.output
-        assert len([line for line in result.stderr.splitlines() if line.startswith("Error")]) == 1
-
-
-@pytest.fixture(scope="module")
-def troubled(tmp_path_factory):
-    """A folder with a study's dataset, and files that are none."""
-    folder = tmp_path_factory.mktemp("troubled")
-    written(made(), folder / "results/small/dataset.nc")
-    written(made(beam=("200x40", "200x40")), folder / "twice.nc")
-    (folder / "text.nc").write_text("text")
-    xr.Dataset({"a": 1}).to_netcdf(folder / "plain.nc")
-    return folder
