@@ -84,7 +84,7 @@ def odd_slope(places, values):
 
 
 def test_cook():
-    shape, material = others.cook()
+    shape, material = others.ALL["cook"]
 
     def place(s, t):
         lower, upper = 44 * s, 44 + 16 * s

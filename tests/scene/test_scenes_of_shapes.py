@@ -246,7 +246,7 @@ def test_a_bar_hangs_by_its_weight():
 
 def test_a_ring_under_pressure():
     """Lame: second order in displacement, and the recovered stress on its rim within .5 %."""
-    shape, material = others.ring()
+    shape, material = others.ALL["ring"]
     names = "inner-point", "hoop"
     known = {one.name: one.expected for one in shape.loads["pressure"].quantities}
     errors = []
@@ -262,7 +262,7 @@ def test_a_ring_under_pressure():
 
 def test_stress_of_the_elliptic_membrane():
     """NAFEMS LE1: 92.7 MPa at D, here from triangles of 35 mm, some 5,100 particles."""
-    shape, material = others.nafems_le1()
+    shape, material = others.ALL["nafems-le1"]
     found = solved(shape, st.mesh_shape(shape, 0.035), material)
     assert found.values["stress-at-D"] == pytest.approx(92.7e6, rel=0.01)
 

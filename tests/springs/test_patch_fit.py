@@ -45,7 +45,7 @@ def curved():
 
 
 SHAPES = {  # with a load and a mean displacement of the side under it
-    "cook": (others.cook()[0], "shear", "mean-tip"),
+    "cook": (others.ALL["cook"][0], "shear", "mean-tip"),
     "hole": (others.holed_plate(100.0, 10.0)[0], "pull", "end"),
     "curved": (curved(), "push", "end"),
 }

@@ -202,15 +202,6 @@ def forget():
         one.cache_clear()
 
 
-def test_runs_depend_on_the_module_of_their_own_engine_alone():
-    """And on no writer of files for others."""
-    shared = {f"{file.parent.name}/{file.name}" for file in keys.closure("studies.kinds.engines.solve").files}
-    assert "engines/run.py" in shared and not {"engines/xpbd.py", "engines/vbd.py", "handover/formats.py"} & shared
-    own = {path.name for path in keys.closure("engines.xpbd").files}
-    assert {"xpbd.py", "textbook.py"} <= own and "vbd.py" not in own
-    assert keys.declared_key(st.ENGINES["xpbd"]) != keys.declared_key(st.ENGINES["vbd"])
-
-
 def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(collected, tmp_path, monkeypatch):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "iterations: 5")
     assert ends(collected("toy", "missing", text=text)["engines"]) == {"rest", "absent", "not_requested"}

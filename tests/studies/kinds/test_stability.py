@@ -1,8 +1,6 @@
 """The section `stability` of a study, and its stage."""
 
 from springtune.studies.runs import attempts, store
-from springtune.studies.runs import keys as code
-from springtune.studies.runs.source import PACKAGE
 
 from tables import STUDIES
 
@@ -21,11 +19,3 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
     content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
     attempts.do_tasks("studies.kinds.stability.solve", content)
     assert store.read(tmp_path / "one.h5", ["one"])["one"]["experiment_message"]
-
-
-def test_static_stages_know_no_dynamics():
-    """A static scene assembles no masses: its stage does not even import them, and density is in none of its keys."""
-    moving = {PACKAGE / "mechanics" / name for name in ("dynamics.py", "kernels.py")}
-    for stage in ("bodies.solve", "bodies.sensitivity", "moduli.solve", "laying.solve"):
-        assert not moving & code.closure(f"studies.kinds.{stage}").files
-    assert moving <= code.closure("studies.kinds.stability.solve").files

@@ -11,9 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
 from springtune.studies.runs import job, store
-from springtune.studies.runs import keys as code
 from springtune.studies.runs.source import hash_of
 from springtune.studies.runs.store import DamagedError
 
@@ -151,28 +149,3 @@ def test_keys_are_those_that_results_were_stored_under():
     """Another key of the same would compute everything again: 24 digits of the SHA-256 of JSON without spaces."""
     assert hash_of({"b": [2, "x"], "a": 0.1}, None) == hashlib.sha256(b'[{"a":0.1,"b":[2,"x"]},null]').hexdigest()[:24]
     assert len(hash_of()) == 24
-
-
-def test_stages_depend_on_what_they_import_and_on_nothing_else():
-    def files(stage, *others):
-        found = code.closure(f"studies.kinds.bodies.{stage}", without=others).files
-        return {path.relative_to(code.PACKAGE).as_posix() for path in found}
-
-    solve, mesh = files("solve", *NOT_OF_BEAMS), files("mesh", "studies.kinds.bodies.task_values")
-    assert {"mechanics/network.py", "mechanics/statics.py", "springs/lattice.py", "mesh/cells.py"} <= solve
-    assert not {"mesh/free.py", "mesh/rows.py"} & solve  # these count with the meshes that they make
-    assert "studies/runs/store.py" in solve
-    for outside in (
-        "studies/output/style.py",
-        "studies/output/dataset.py",
-        "studies/config/expand.py",
-        "reference/small_strain.py",
-    ):
-        assert outside not in solve
-    assert "problem/compare.py" not in solve
-    assert "mechanics/statics.py" not in mesh
-    # References know the mesh of a network by its type alone, so an edit of a mesh does not solve them again. The sides
-    # of outlines are geometry, which load cases are on.
-    reference = code.closure("studies.kinds.bodies.reference", without=("studies.kinds.bodies.shape_reference",)).files
-    assert {path.name for path in reference if path.parent.name == "mesh"} <= {"segments.py", "sides.py"}
-    assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again

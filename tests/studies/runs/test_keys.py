@@ -2,11 +2,13 @@
 
 import importlib.metadata
 import sys
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
 import yaml
 
+from springtune.engines.base import ENGINES
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
 from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
@@ -41,9 +43,21 @@ def test_no_module_imports_a_package_that_brings_in_others():
     assert not any(keys.imports_graph().find_modules_that_directly_import(face) for face in faces)
 
 
-def test_a_template_counts_with_the_module_of_its_name():
-    files = {path.name for path in keys.closure("handover.mujoco").files}
-    assert {"mujoco.py", "mujoco.xml.jinja"} <= files and not {name for name in files if name.startswith("sofa")}
+@pytest.mark.parametrize("row", TABLES["closures"].values(), ids=TABLES["closures"])
+def test_a_module_counts_with_what_it_imports_and_with_nothing_else(row):
+    without = NOT_OF_BEAMS if row.get("without") == "beams" else tuple(row.get("without", ()))
+    files = keys.closure(row["module"], without=without).files
+    found = {path.relative_to(keys.PACKAGE).as_posix() for path in files}
+    known = {*row.get("has", ())}
+    assert known <= found
+    assert not [name for name in found - known if any(fnmatch(name, one) for one in row.get("lacks", ()))]
+
+
+def test_an_engine_and_a_mesher_have_keys_of_their_own():
+    assert keys.declared_key(ENGINES["xpbd"]) != keys.declared_key(ENGINES["vbd"])
+    assert "netgen" in keys.mesh_type_closure("free").packages
+    assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
+    assert "meshio" in keys.mesh_type_closure("from a file").packages
 
 
 # -- what springtune runs on -------------------------------------------------------------------------------------------
@@ -54,12 +68,6 @@ WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "typst", "jin
 @pytest.mark.parametrize("stage", stages(), ids=lambda stage: stage.name)
 def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
     assert not keys.closure(stage.module).packages & (WRITING | keys.CARRIERS)
-
-
-def test_meshers_count_with_their_meshes():
-    assert "netgen" in keys.mesh_type_closure("free").packages
-    assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
-    assert "meshio" in keys.mesh_type_closure("from a file").packages
 
 
 def forget():
