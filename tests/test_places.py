@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-import springtune
+import springtune as st
 
 from tables import STUDIES
 
@@ -31,7 +31,7 @@ import json, sys
 from springtune.studies.runs import keys
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
-import springtune
+import springtune as st
 found = {
     "place": springtune.__file__,
     "DEFINITIONS": {name: keys.definition_closure(name).digest for name in DEFINITIONS},
@@ -75,7 +75,7 @@ def report(folder):
 def copy(tmp_path_factory):
     """A copy of the package that tests may write to, and what it says of itself."""
     folder = tmp_path_factory.mktemp("copy")
-    source = Path(springtune.__file__).parent
+    source = Path(st.__file__).parent
     shutil.copytree(source, folder / "springtune")  # with what is compiled
     return folder, report(folder)
 

@@ -8,9 +8,10 @@ import pint
 import pytest
 import yaml
 from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
-from springtune.units import QUANTITY_DIMENSIONS, UnitError, parse
+import springtune as st
+from springtune.units import QUANTITY_DIMENSIONS, parse
 
 REGISTRY = pint.UnitRegistry()
 
@@ -36,24 +37,24 @@ def test_examples_in_messages_are_right(kind):
 
 @pytest.mark.parametrize(("text", "kind", "says"), QUANTITIES["refused"])
 def test_refuses(text, kind, says):
-    with pytest.raises(UnitError) as caught:
+    with pytest.raises(st.UnitError) as caught:
         parse(text, kind)
     assert says in str(caught.value)
     assert QUANTITY_DIMENSIONS[kind].example in str(caught.value)
 
 
 @given(
-    st.sampled_from(USUAL),
-    st.decimals(min_value="-1e12", max_value="1e12", places=6, allow_nan=False, allow_infinity=False),
+    some.sampled_from(USUAL),
+    some.decimals(min_value="-1e12", max_value="1e12", places=6, allow_nan=False, allow_infinity=False),
 )
 def test_value_is_the_nearest_float(kind_and_unit, number):
     kind, unit = kind_and_unit
     assert parse(f"{number} {unit}", kind) == float(number * Decimal(QUANTITY_DIMENSIONS[kind].units[unit]))
 
 
-@given(st.text(max_size=20), st.sampled_from(sorted(QUANTITY_DIMENSIONS)))
+@given(some.text(max_size=20), some.sampled_from(sorted(QUANTITY_DIMENSIONS)))
 def test_any_text_is_read_or_refused(text, kind):
     try:
         assert math.isfinite(parse(text, kind))
-    except UnitError:
+    except st.UnitError:
         pass

@@ -11,7 +11,7 @@ from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
-import springtune
+import springtune as st
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import STATUS
@@ -97,12 +97,7 @@ def written(folder, groups, **attributes):
     """Address of the page of a dataset."""
     folder.mkdir(parents=True, exist_ok=True)
     tree = xr.DataTree.from_dict(groups)
-    usual = {
-        "springtune_version": springtune.__version__,
-        "study": "mine",
-        "title": "A study",
-        "config": "title: A study",
-    }
+    usual = {"springtune_version": st.__version__, "study": "mine", "title": "A study", "config": "title: A study"}
     tree.attrs = usual | attributes
     tree.to_netcdf(folder / "dataset.nc", engine="h5netcdf")
     path = folder / "index.html"

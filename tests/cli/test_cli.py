@@ -11,17 +11,12 @@ import pytest
 import yaml
 from click.testing import CliRunner
 
-import springtune
+import springtune as st
 from springtune.cli import COMMANDS, main
 from springtune.handover.formats import NET_FORMATS
-from springtune.mesh import MESH_TYPES
 from springtune.prediction import choices as of_one_mesh
-from springtune.prediction.search import find_mesh
-from springtune.problem.geometry import AssumptionWarning, Beam
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
+from springtune.problem.geometry import AssumptionWarning
 from springtune.studies.config.sections import schema_text
-from springtune.studies.kinds import load_study
 
 from tables import STUDIES, run
 
@@ -74,7 +69,7 @@ class TestAssumptions:
         ],
     )
     def test_the_library_warns(self, sides, said):
-        for body in (springtune.Beam, springtune.Shape.rectangle):
+        for body in (st.Beam, st.Shape.rectangle):
             with pytest.warns(AssumptionWarning, match=said) if said else nullcontext():
                 body(*sides[:2], thickness=sides[2])
 
@@ -101,7 +96,7 @@ def test_help_has_examples_that_name_real_commands_and_options(command):
 
 def test_definitions_lists_all_with_summaries():
     lines = words(run("definitions").stdout)
-    assert lines == [" ".join(f"{name} {definition.summary}".split()) for name, definition in DEFINITIONS.items()]
+    assert lines == [" ".join(f"{name} {definition.summary}".split()) for name, definition in st.DEFINITIONS.items()]
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +120,7 @@ class TestSchema:
         text = study.read_text()
         assert text.startswith(f"# yaml-language-server: $schema={SCHEMA}\n")
         validator.validate(yaml.safe_load(text))
-        load_study(study)
+        st.load_study(study)
 
     @pytest.mark.parametrize(
         ("old", "new"),
@@ -175,7 +170,7 @@ class TestPredictAMesh:
         lines = result.stdout.splitlines()
         body = "100x20 mm; steel, E = 210 GPa, nu = 0.3, t = 1 mm"
         assert lines[0] == f"{body}; an error of at most 8 % under traction, bending and shear"
-        search = find_mesh(Beam(0.1, 0.02), Material(210e9, 0.3), "8 %", mesh_types=["right", "braced"])
+        search = st.find_mesh(st.Beam(0.1, 0.02), st.Material(210e9, 0.3), "8 %", mesh_types=["right", "braced"])
         best, plain = search.best, search.best_springs
         size = f"{best.mesh_type} {1e3 * best.size:g} mm with {best.choice.definition}, {best.particles} particles"
         assert f"recommended: {size}" in lines
@@ -203,8 +198,8 @@ class TestPredictAMesh:
         assert f"recommended: {header['definition']}; with springs alone: {header['definition']}" in said.stdout
 
         run("predict", *STEEL, "--size", "5 mm", "--load", "pressure", "--write", target)
-        header, mesh = json.loads(target.read_text())["header"], MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-        best = of_one_mesh.predict(Beam(0.1, 0.02), mesh, Material(210e9, 0.3), loads=["pressure"])[0]
+        header, mesh = json.loads(target.read_text())["header"], st.MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        best = of_one_mesh.predict(st.Beam(0.1, 0.02), mesh, st.Material(210e9, 0.3), loads=["pressure"])[0]
         assert header["definition"] == best.definition
         assert header["expected_error"] == pytest.approx(best.errors, rel=1e-9)
 

@@ -9,9 +9,6 @@ import pytest
 
 import springtune as st
 from springtune.cli.run import SLURM
-from springtune.mesh import MESH_TYPES
-from springtune.problem.loads import LOADS
-from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from tables import run
@@ -59,7 +56,7 @@ class TestNew:
             "config/my-study.yaml: 2 scenes; change it as you like, and run it:",
             "  springtune run config/my-study.yaml",
         ]
-        study = load_study("config/my-study.yaml")
+        study = st.load_study("config/my-study.yaml")
         assert len(study.scenes) == 2 and study.title == "My study"
         assert {scene.definition for scene in study.scenes} == {"lattice", "patch"}
 
@@ -68,13 +65,13 @@ class TestNew:
         lines = Path("config/my-study.yaml").read_text().splitlines()
         assert len([line for line in lines if not line.startswith("#")]) <= 15 and max(map(len, lines)) <= 120
         (types,) = (line.partition("# or ")[2].split(", ") for line in lines if "mesh_type:" in line)
-        assert {"free", "right"} <= set(types) <= set(MESH_TYPES)
+        assert {"free", "right"} <= set(types) <= set(st.MESH_TYPES)
         (loads,) = (line.partition("# or ")[2].split(", ") for line in lines if "load:" in line)
-        assert len(loads) > 1 and set(loads) <= set(LOADS)
+        assert len(loads) > 1 and set(loads) <= set(st.LOADS)
         for load in loads:  # each may be put in the place of the one that is there
             text = "\n".join(lines).replace("load: traction", f"load: {load}")
             Path("config/other.yaml").write_text(text)
-            assert len(load_study("config/other.yaml").scenes) == 2
+            assert len(st.load_study("config/other.yaml").scenes) == 2
         assert (Path("config") / re.search(r"\$schema=(\S+)", lines[0])[1]).is_file()
 
     @pytest.mark.slow
@@ -83,13 +80,13 @@ class TestNew:
         assert result.stdout.startswith("config/my-plate.yaml: 4 scenes; change it as you like")
         text = Path("config/my-plate.yaml").read_text()
         assert max(map(len, text.splitlines())) <= 120
-        study = load_study("config/my-plate.yaml")
+        study = st.load_study("config/my-plate.yaml")
         assert len(study.shapes.scenes) == 4 and study.title == "My plate"
         # What the comments offer may be put in.
         Path("config/pressed.yaml").write_text(text.replace("# pressures:", "pressures:"))
-        assert load_study("config/pressed.yaml").shape("plate").loads["pull"].pressures[0].pressure == 1e6
+        assert st.load_study("config/pressed.yaml").shape("plate").loads["pull"].pressures[0].pressure == 1e6
         Path("config/rollers.yaml").write_text(text.replace("left: fixed", "left: {x: 0 mm}, top: {y: 0}"))
-        assert load_study("config/rollers.yaml").shape("plate").loads["pull"].supports[0].y is None
+        assert st.load_study("config/rollers.yaml").shape("plate").loads["pull"].supports[0].y is None
         scenes = ran("config/my-plate.yaml", "shapes")
         assert float(abs(scenes.error.sel(quantity="stretch")).max()) < 0.1
 
@@ -101,7 +98,7 @@ class TestNew:
     def test_outside_of_a_checkout_it_is_written_here(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         assert run("new", "my-study").exit_code == 0
-        assert len(load_study(tmp_path / "my-study.yaml").scenes) == 2
+        assert len(st.load_study(tmp_path / "my-study.yaml").scenes) == 2
         schema = re.search(r"\$schema=(\S+)", (tmp_path / "my-study.yaml").read_text())[1]
         assert (tmp_path / schema).resolve() == REPOSITORY / "config/study.schema.json"
 

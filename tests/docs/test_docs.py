@@ -18,7 +18,6 @@ import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
-from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from pages import blocks as blocks_of
@@ -67,7 +66,7 @@ def test_relative_links_lead_somewhere(page):
 
 
 def test_the_study_of_the_readme_asks_for_what_its_table_claims():
-    study = load_study(REPOSITORY / "config/paper.yaml")
+    study = st.load_study(REPOSITORY / "config/paper.yaml")
     asked = {
         (one.definition, one.mesh.beam.name, one.mesh.mesh_type, one.mesh.mesh_size, one.material.name, one.load)
         for one in study.scenes
@@ -250,5 +249,5 @@ def test_every_picture_is_of_a_study_or_an_example():
         if "example" in picture:
             assert "plt.subplots" in (REPOSITORY / f"examples/{picture['example']}.py").read_text()
             continue
-        study = load_study(REPOSITORY / f"config/{picture['study']}.yaml")
+        study = st.load_study(REPOSITORY / f"config/{picture['study']}.yaml")
         assert picture["figure"] in {stem for one in study.outputs for stem in outputs()[one].figures(study)}, picture

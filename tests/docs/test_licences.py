@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-import springtune
+import springtune as st
 
 PROGRAM = Path(__file__).parents[2] / "tools/licences.py"
 
@@ -39,5 +39,5 @@ VERSION, DATE = re.search(r"^## (\S+) \((.*)\)$", (REPOSITORY / "CHANGELOG.md").
 
 
 def test_version_of_citation_and_changelog():
-    assert CITATION["version"] == VERSION == springtune.__version__
+    assert CITATION["version"] == VERSION == st.__version__
     assert re.fullmatch(r"\d+\.\d+\.\d+", VERSION)

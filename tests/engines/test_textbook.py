@@ -9,7 +9,6 @@ from scipy.linalg import expm
 
 import springtune as st
 from springtune.engines import pbd, run
-from springtune.engines.base import ENGINES
 from springtune.handover.simulation import network_of
 
 from engine_scenes import CASES, TEN, scene
@@ -214,7 +213,7 @@ def one_spring(stiffness=30.0, mass=0.02, force=0.6):
 @pytest.mark.parametrize("engine", ["pbd", "xpbd", "projective", "vbd", "vbd-inertia"])
 @pytest.mark.parametrize(("h", "iterations"), [(0.01, 1), (0.1, 3)])
 def test_one_spring_is_exact_at_any_setting(engine, h, iterations):
-    session = ENGINES[engine].start(one_spring(), st.Setting(h, iterations=iterations), damping=30.0)
+    session = st.ENGINES[engine].start(one_spring(), st.Setting(h, iterations=iterations), damping=30.0)
     session.advance(3000)
     assert session.displacements()[1] == pytest.approx([0.02, 0], rel=1e-9)
 
@@ -224,12 +223,12 @@ def test_stiffness_that_a_share_means(share, iterations):
     """((1 - s)^-n - 1) / (w h^2): the same share is any stiffness, and a rod in the end."""
     net, h = one_spring(), 0.01
     setting = st.Setting(h, iterations=iterations)
-    session = ENGINES["pbd"].start(net, setting, damping=30.0)
+    session = st.ENGINES["pbd"].start(net, setting, damping=30.0)
     session.shares[:] = share
     session.advance(5000)
     meant = ((1 - share) ** -iterations - 1) * net.masses[1] / h**2
     assert session.displacements()[1, 0] == pytest.approx(net.forces[1, 0] / meant, rel=1e-9)
-    typed = ENGINES["pbd"].numbers(
+    typed = st.ENGINES["pbd"].numbers(
         dataclasses.replace(net, stiffness=np.array([meant])), st.Setting(h, iterations=iterations)
     )
     assert typed["stiffness"] == pytest.approx([share])
@@ -255,7 +254,7 @@ def test_each_iteration_lowers_the_energy_of_a_step(engine):
     push = np.where(net.held, 0, h**2 * net.forces / net.masses[:, None])
     energies = []
     for iterations in range(1, 40):
-        session = ENGINES[engine].start(net, st.Setting(h, iterations=iterations), 0.0)
+        session = st.ENGINES[engine].start(net, st.Setting(h, iterations=iterations), 0.0)
         session.advance(1)
         moved = session.displacements()
         energies.append(0.5 * (net.masses[:, None] * (moved - push) ** 2).sum() / h**2 + network.energy(moved))
@@ -277,7 +276,7 @@ def test_each_iteration_lowers_the_energy_of_a_step(engine):
 )
 def test_energies_besides_springs(engine, case):
     one = of_energies.scene(case)
-    if lacking := [each for each in run.net_of(one).energies if each.kind not in ENGINES[engine].laws]:
+    if lacking := [each for each in run.net_of(one).energies if each.kind not in st.ENGINES[engine].laws]:
         with pytest.raises(st.EngineError, match=f"engine '{engine}' has no rubber.*or engine .*implicit-cg"):
             st.in_engine(one, engine)
         assert lacking[0].kind in ("compressible", "incompressible") and engine != "implicit-cg"
@@ -314,12 +313,12 @@ def test_negative_stiffness_is_for_conjugate_gradients_alone(engine):
     net = run.net_of(scene(*SHEET, "patch"))
     pushing = dataclasses.replace(net, stiffness=np.where(np.arange(len(net.springs)) == 3, -1e-3, 1) * net.stiffness)
     if engine == "implicit-cg":
-        ENGINES[engine].start(pushing, st.Setting(), 0.0).advance(1)
+        st.ENGINES[engine].start(pushing, st.Setting(), 0.0).advance(1)
     else:
         with pytest.raises(
             st.EngineError, match="'patch': has springs of negative stiffness, .*or engine 'implicit-cg'"
         ):
-            ENGINES[engine].start(pushing, st.Setting(), 0.0)
+            st.ENGINES[engine].start(pushing, st.Setting(), 0.0)
 
 
 # -- where a session ends -------------------------------------------------------------------------------------------

@@ -32,12 +32,11 @@ import yaml
 
 import springtune as st
 from springtune.mechanics.moduli import PatchTest
-from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas, write_mesh
+from springtune.mesh import corner_angles, read_beam_mesh, signed_areas, write_mesh
 from springtune.mesh.formats import read_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.problem.geometry import AssumptionWarning
 from springtune.studies.config.kind import kinds
-from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies.kind import summary
 
 SECONDS, BYTES = 10, 1_000_000_000
@@ -160,7 +159,7 @@ def study_trees(random, folder):
 
 def read_study(path):
     try:
-        study = load_study(path)
+        study = st.load_study(path)
     except st.StudyError as error:
         raise Refused(str(error)) from None
     if len(study.scenes) <= 2_000:
@@ -179,7 +178,7 @@ def files():
     found = []
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         for number, (ending, name) in enumerate(FORMATS):
-            mesh = MESH_TYPES["braced" if number % 2 else "free"](*BOX, 5e-3)
+            mesh = st.MESH_TYPES["braced" if number % 2 else "free"](*BOX, 5e-3)
             kind, corners = ("quad", mesh.quads) if len(mesh.quads) else ("triangle", mesh.triangles)
             path = Path(folder) / f"{name}.{ending}"
             flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
@@ -201,7 +200,7 @@ def read_mesh(path):
     """Read a mesh file; what is accepted fills the beam and has the modulus of its material."""
     try:
         mesh = read_beam_mesh(path, *BOX)
-    except MeshError as error:
+    except st.MeshError as error:
         raise Refused(str(error)) from None
     area = sum(signed_areas(mesh.points, one).sum() for one in mesh.cells.values())
     assert abs(area / (BOX[0] * BOX[1]) - 1) < 1e-6, "is accepted and does not cover its beam"
@@ -216,7 +215,7 @@ def read_groups(path):
     """Read a mesh file with groups; what is accepted is a sheet, whose groups are on its outline."""
     try:
         grouped = read_shape(path)
-    except MeshError as error:
+    except st.MeshError as error:
         raise Refused(str(error)) from None
     outline = {tuple(edge) for edge in grouped.mesh.edges[grouped.mesh.on_outline].tolist()}
     assert not sheet_fault(grouped.mesh), "is accepted and no sheet"

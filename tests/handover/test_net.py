@@ -261,11 +261,7 @@ class TestResult:
         names = [block.type for block in grid.cells]
         assert names == ["line", "triangle"]
         moved, expected = result.displacements, result.reference().at(result.scene.mesh.points)
-        for name, field in (
-            ("displacement", moved),
-            ("reference_displacement", expected),
-            ("error", moved - expected),
-        ):
+        for name, field in (("displacement", moved), ("reference_displacement", expected), ("error", moved - expected)):
             assert (grid.point_data[name][:, :2] == field).all() and not grid.point_data[name][:, 2].any()
         assert (grid.cell_data["stiffness"][0] == result.stiffness).all()
         assert (grid.cell_data["force"][0] == result.spring_forces).all()

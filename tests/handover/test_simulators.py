@@ -9,10 +9,8 @@ import pytest
 
 import springtune as st
 from mechanics import spring_forces
-from springtune.handover.net import SpringNet
 from springtune.handover.simulation import STABLE_STEP_SHARE, EquilibriumWarning
-from springtune.mesh import Mesh, signed_areas
-from springtune.springs import DEFINITIONS
+from springtune.mesh import signed_areas
 
 from problems import pulled
 
@@ -26,13 +24,7 @@ OLD = mujoco.__version__.startswith("3.")
 """`tests/versions` runs this file by MuJoCo 3, too."""
 
 
-PROGRAMS = {
-    ".xml": "MuJoCo",
-    ".mjcf": "MuJoCo",
-    ".py": "SOFA",
-    ".newton.py": "Newton",
-    ".xpbd.json": "XPBD",
-}
+PROGRAMS = {".xml": "MuJoCo", ".mjcf": "MuJoCo", ".py": "SOFA", ".newton.py": "Newton", ".xpbd.json": "XPBD"}
 
 
 @pytest.fixture(autouse=True)
@@ -87,7 +79,7 @@ def test_equilibria_are_those_of_mujoco(mesh_type, size, every, tmp_path):
     """Each definition under all loads or one, which changes from one to the next; or it is refused for its energies."""
     sheet, turn = None, MESHES.index(mesh_type)
     balanced, refused = set(), set()
-    for number, (name, definition) in enumerate(DEFINITIONS.items()):
+    for number, (name, definition) in enumerate(st.DEFINITIONS.items()):
         if definition.needs == "cases":  # searches on a scene's reference, whose springs are such as all others
             continue
         told = {"stiffness": "170e6 N/m"} if definition.needs == "stiffness" else {}
@@ -248,7 +240,7 @@ def test_a_large_net_has_its_frequencies_by_multigrid(monkeypatch, tmp_path):
 
 
 def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
-    net = SpringNet.from_mesh(st.make_mesh(BEAM, "free", "5 mm"), STEEL, "lattice", errors=False)
+    net = st.SpringNet.from_mesh(st.make_mesh(BEAM, "free", "5 mm"), STEEL, "lattice", errors=False)
     for ending in PROGRAMS:
         net.write(tmp_path / f"net{ending}")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.mjcf"))
@@ -272,7 +264,7 @@ def test_single_triangles_of_a_flex_have_the_law_of_plane_stress(poisson, tmp_pa
     for _ in range(5):
         turn = 2 * np.pi * (np.arange(3) / 3 + rng.uniform(-0.1, 0.1, 3))
         points = 0.01 * rng.uniform(0.5, 1.5, 3)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-        net = SpringNet.from_mesh(Mesh(points, np.array([[0, 1, 2]])), material, "delingette", thickness="2 mm")
+        net = st.SpringNet.from_mesh(st.Mesh(points, np.array([[0, 1, 2]])), material, "delingette", thickness="2 mm")
         [path] = net.write(tmp_path / "triangle.xml")
         model = mujoco.MjModel.from_xml_path(str(path))
         data = mujoco.MjData(model)
@@ -308,7 +300,7 @@ def test_a_file_of_springs_is_enough_for_a_simulator(ending, tmp_path):
     one = scene("free", "shear", "patch")
     direct = written(one, tmp_path, ending)
     [path] = one.springs.write(tmp_path / "arrays.json", errors=False)
-    again = SpringNet.read(path).write(tmp_path / f"again{ending}")[0]
+    again = st.SpringNet.read(path).write(tmp_path / f"again{ending}")[0]
     assert again.read_text().replace("again.", "net.") == direct
 
 
@@ -567,7 +559,7 @@ def test_files_of_shapes_balance_by_what_they_hold_alone(load, tmp_path):
     held[np.array(xpbd["inverse_masses"]) == 0] = True
     found["XPBD"] = pairs, 1 / compliance, lengths, held, np.array(xpbd["forces"])
     one.springs.write(tmp_path / "net.json", errors=False)
-    net = SpringNet.read(tmp_path / "net.json")
+    net = st.SpringNet.read(tmp_path / "net.json")
     found["arrays"] = net.springs, net.stiffness, net.rest_lengths, net.held, net.forces
     for program, (springs, stiffness, lengths, held, forces) in found.items():
         assert np.array_equal(held, one.held), program

@@ -6,10 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 from scipy.sparse import csc_array, csr_array
 
-import springtune
+import springtune as st
 from springtune.linalg import kernels
 from springtune.linalg.blocks import Blocks, chunked, dense, first_grid, next_grid, row_pointers
 from springtune.linalg.factors import (
@@ -25,11 +25,8 @@ from springtune.linalg.multigrid import IndefiniteError, Multigrid, galerkin
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINS_FROM_UNKNOWNS, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL
-from springtune.problem.status import Status
-from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import half_weight
 
 FORCE_OVER_STIFFNESS = 2e-4
@@ -45,14 +42,14 @@ def both(function):
     return [function(solver) for solver in ("Cholesky", "SuperLU")]
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_scenes_have_the_same_answer(mesh_type):
-    mesh = MESH_TYPES[mesh_type](0.05, 0.02, 2.5e-3)
+    mesh = st.MESH_TYPES[mesh_type](0.05, 0.02, 2.5e-3)
 
     def solve(solver):
         problem = problem_on(mesh, solver=solver)
         found = [problem.linear(FORCE_OVER_STIFFNESS), problem.nonlinear(FORCE_OVER_STIFFNESS)]
-        assert all(problem.judge(FORCE_OVER_STIFFNESS, one)[0] is Status.SOLVED for one in found)
+        assert all(problem.judge(FORCE_OVER_STIFFNESS, one)[0] is st.Status.SOLVED for one in found)
         return found
 
     ours, theirs = both(solve)
@@ -63,7 +60,7 @@ def test_scenes_have_the_same_answer(mesh_type):
 
 
 def test_a_singular_tangent_is_reported_by_either():
-    mesh = MESH_TYPES["structured"](0.05, 0.02, 5e-3)
+    mesh = st.MESH_TYPES["structured"](0.05, 0.02, 5e-3)
     stiffness = half_weight(mesh)
     loose = mesh.edges == len(mesh.points) - 1
     stiffness[loose.any(axis=1)] = 0.0  # a particle without springs
@@ -75,7 +72,7 @@ def test_a_singular_tangent_is_reported_by_either():
 
 def test_factors_of_one_mesh_do_not_overwrite_each_other():
     """One symbolic factorization serves them all, each numeric one takes its place: it must be given back unused."""
-    mesh = MESH_TYPES["structured"](0.05, 0.02, 5e-3)
+    mesh = st.MESH_TYPES["structured"](0.05, 0.02, 5e-3)
     tangent = problem_on(mesh).network.tangent()
     analysis = Analysis(tangent.indices, tangent.indptr)
     right = np.arange(1.0, tangent.shape[0] + 1)
@@ -91,7 +88,7 @@ def test_factors_of_one_mesh_do_not_overwrite_each_other():
 
 
 def test_many_right_hand_sides_at_once():
-    network = problem_on(MESH_TYPES["structured"](0.05, 0.02, 5e-3)).network
+    network = problem_on(st.MESH_TYPES["structured"](0.05, 0.02, 5e-3)).network
     right = np.random.default_rng(0).standard_normal((network.unknowns, 3))
     together = network.rest_factor.solve(right)
     for column in range(3):
@@ -121,7 +118,7 @@ def test_a_matrix_of_any_sparsity_is_factorized():
 
 
 @settings(max_examples=50, deadline=None)
-@given(size=st.integers(2, 40), below=st.integers(0, 6), pins=st.integers(1, 8), seed=st.integers(0, 2**32 - 1))
+@given(size=some.integers(2, 40), below=some.integers(0, 6), pins=some.integers(1, 8), seed=some.integers(0, 2**32 - 1))
 def test_pins_count_negative_eigenvalues_and_solve(size, below, pins, seed):
     """Inertia and solution of dense matrices of a known spectrum, as those of eigenvalues and of LAPACK's LU."""
     generator = np.random.default_rng(seed)
@@ -157,7 +154,7 @@ def test_pins_count_nothing_in_a_singular_matrix():
 
 def pinned_mesh(mesh_type="structured"):
     """A slender beam, of just so many unknowns that an unstable one gets pins."""
-    mesh = MESH_TYPES[mesh_type](0.2, 0.02, 1.2e-3)
+    mesh = st.MESH_TYPES[mesh_type](0.2, 0.02, 1.2e-3)
     assert 2 * len(mesh.points) > 1.02 * PINS_FROM_UNKNOWNS
     return mesh
 
@@ -196,7 +193,7 @@ def test_a_stable_tangent_after_an_unstable_one_has_the_factor_that_it_always_ha
 
 
 def test_particles_that_are_spread_are_far_from_each_other():
-    mesh = MESH_TYPES["free"](0.2, 0.04, 4e-3)
+    mesh = st.MESH_TYPES["free"](0.2, 0.04, 4e-3)
     points = mesh.points[spread(mesh.points, 16)]
     apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
     assert len(points) == 16 and apart.min() > 0.5 * (mesh.area / 16) ** 0.5
@@ -242,7 +239,7 @@ def scattered_blocks(generator, count):
 
 
 @settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), coarsening=st.floats(0.3, 8.0))
+@given(seed=some.integers(0, 2**32 - 1), coarsening=some.floats(0.3, 8.0))
 def test_grids_hold_rigid_motions_and_even_strains(seed, coarsening):
     """Bilinear interpolation of a linear field is the field, wherever particles are, and from grid to grid."""
     generator = np.random.default_rng(seed)
@@ -258,7 +255,7 @@ def test_grids_hold_rigid_motions_and_even_strains(seed, coarsening):
 
 
 @settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), coarsening=st.floats(0.5, 8.0))
+@given(seed=some.integers(0, 2**32 - 1), coarsening=some.floats(0.5, 8.0))
 def test_coarse_matrices_are_galerkins(seed, coarsening):
     """Whatever points are joined: neighbours, or those with several cells between them."""
     points, matrix, full = scattered_blocks(np.random.default_rng(seed), 24)
@@ -286,9 +283,9 @@ def test_chunks_of_rows_multiply_and_precondition_the_same_with_any_number_of_th
     assert np.array_equal(solution, other.solve(right))
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_multigrid_gives_what_a_factorization_gives(mesh_type):
-    mesh = MESH_TYPES[mesh_type](0.1, 0.04, 1.8e-3)
+    mesh = st.MESH_TYPES[mesh_type](0.1, 0.04, 1.8e-3)
     problem = problem_on(mesh)
     factor = iterative(problem.network)
     solution, exact = factor.solve(problem.load), problem.network.rest_factor.solve(problem.load)
@@ -298,7 +295,7 @@ def test_multigrid_gives_what_a_factorization_gives(mesh_type):
 
 def test_multigrid_meets_what_is_unstable_without_being_shown_where():
     """The load stretches the beam and does not bend it; yet the random residual besides finds that it buckles."""
-    mesh = MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
+    mesh = st.MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
     problem = problem_on(mesh)
     pressed = -5e-3 * problem.slope / np.abs(problem.slope).max()
     exact = problem.network.factorize_tangent(pressed)
@@ -314,7 +311,7 @@ def test_multigrid_meets_what_is_unstable_without_being_shown_where():
 @pytest.mark.parametrize("factor", [-1.0, -1e-3])
 def test_multigrid_tells_of_a_particle_that_is_pushed_away(factor):
     """A smoother that divides by a diagonal that is not positive would make conjugate gradients blind to it."""
-    mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
+    mesh = st.MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
     stiffness = half_weight(mesh)
     middle = np.linalg.norm(mesh.points - [0.05, 0.02], axis=1).argmin()
     stiffness[(mesh.edges == middle).any(axis=1)] *= factor
@@ -334,7 +331,7 @@ LOOSE = {
 
 def loose(what):
     """Mesh, what is held, and springs with a motion without stiffness."""
-    mesh = MESH_TYPES["right"](0.1, 0.04, 1.8e-3)
+    mesh = st.MESH_TYPES["right"](0.1, 0.04, 1.8e-3)
     stiffness, fixed = half_weight(mesh), held(mesh, AXIAL)
     middle = np.linalg.norm(mesh.points - [0.05, 0.02], axis=1).argmin()
     ends = mesh.points[mesh.edges]
@@ -376,15 +373,15 @@ def test_no_mechanism_hangs_on_rounding(what, solver):
         mesh, fixed, stiffness = loose(what)
     else:
         corners = ((0, 0), (0.06, 0), (0.06, 0.02), (0.02, 0.02), (0.02, 0.06), (0, 0.06))
-        mesh = springtune.mesh_shape(springtune.Shape("L", 1e-3, list(map(springtune.Segment, corners))), 4e-3).mesh
+        mesh = st.mesh_shape(st.Shape("L", 1e-3, list(map(st.Segment, corners))), 4e-3).mesh
         across, shear = PLIES[what]
-        ply = springtune.AnisotropicMaterial.orthotropic(2.0, across, 0.3, shear, np.pi / 6)
-        stiffness = DEFINITIONS["element-fit"].springs(mesh, ply, 1e-3).relative
+        ply = st.AnisotropicMaterial.orthotropic(2.0, across, 0.3, shear, np.pi / 6)
+        stiffness = st.DEFINITIONS["element-fit"].springs(mesh, ply, 1e-3).relative
         fixed = np.repeat(mesh.points[:, 1:] > 0.06 - 1e-9, 2, axis=1)
     for seed in range(3):
         rng = np.random.default_rng(seed)
         order = rng.permutation(len(mesh.points)) if seed else np.arange(len(mesh.points))
-        other = Mesh(mesh.points[order], np.argsort(order)[mesh.triangles])
+        other = st.Mesh(mesh.points[order], np.argsort(order)[mesh.triangles])
         places = {tuple(sorted(pair)): row for row, pair in enumerate(np.argsort(order)[mesh.edges].tolist())}
         springs = stiffness[[places[tuple(pair)] for pair in other.edges.tolist()]]
         springs = springs + 1e-15 * seed * springs.max() * rng.standard_normal(len(springs))
@@ -412,7 +409,7 @@ def test_what_takes_over_from_multigrid(solver, unknowns, symmetric, cholesky, f
 
 
 def test_an_unsymmetric_tangent_that_gradients_do_not_solve_goes_to_superlu():
-    mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
+    mesh = st.MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
     top = mesh.edges[(mesh.points[mesh.edges][:, :, 1] >= mesh.points[:, 1].max()).all(axis=1)]
     pressed = 0 * mesh.points, (0.05, FollowerPressure.of_side(mesh, top, 0))
     network, exact = problem_on(mesh).network, problem_on(mesh, solver="SuperLU").network
@@ -426,7 +423,7 @@ def test_an_unsymmetric_tangent_that_gradients_do_not_solve_goes_to_superlu():
 
 
 def test_newton_goes_on_in_steps_where_multigrid_meets_an_unstable_tangent():
-    mesh = MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
+    mesh = st.MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
     problem = problem_on(mesh, solver="multigrid")
     found = problem.nonlinear(-1e-5)  # it buckles at two thirds of that
     assert not found.converged and "unstable beyond" in found.reason and 0.5 < found.load_share < 0.7
@@ -447,11 +444,11 @@ def test_a_million_particles_take_2_gigabytes():
 
 def sheet(mesh_type, size):
     """A square sheet, the least favourable extents: no order along it has a narrow band."""
-    mesh = MESH_TYPES[mesh_type](0.1, 0.1, size)
+    mesh = st.MESH_TYPES[mesh_type](0.1, 0.1, size)
     return problem_on(mesh, solver="SuperLU").network
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_the_order_is_of_all_particles_once(mesh_type):
     mesh = sheet(mesh_type, 4e-3).mesh
     assert sorted(nested_dissection(mesh.points, mesh.edges).tolist()) == list(range(len(mesh.points)))

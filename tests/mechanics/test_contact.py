@@ -7,26 +7,25 @@ import pytest
 from netgen.geom2d import SplineGeometry
 from netgen.meshing import MeshingParameters
 
+import springtune as st
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, oriented_outline
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, Mesh, signed_areas
+from springtune.mesh import signed_areas
 from springtune.problem.compare import band
 from springtune.problem.geometry import Strip, Trapezoid
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
 from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
 from springtune.studies.kinds.laying.solve import lay
 
-RUBBER, STEEL = Material(1e6, 0.49, name="rubber"), Material(210e9, 0.3, name="steel")
+RUBBER, STEEL = st.Material(1e6, 0.49, name="rubber"), st.Material(210e9, 0.3, name="steel")
 STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)
 
 
 def block(mesh_type, size, bottom, modulus=1e6, pressure=0.0, moves_little=True):
     """A block of 20 x 10 mm, free but for one particle that keeps its x, pressed on its upper face."""
-    made = MESH_TYPES[mesh_type](0.02, 0.01, size)
-    mesh = Mesh(made.points + [0, bottom], made.triangles, made.quads)
+    made = st.MESH_TYPES[mesh_type](0.02, 0.01, size)
+    mesh = st.Mesh(made.points + [0, bottom], made.triangles, made.quads)
     definition = "area" if len(mesh.quads) else "delingette"
-    springs = DEFINITIONS[definition].springs(mesh, Material(modulus, 0.3, name="any"), 1e-3)
+    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(modulus, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.argmin(mesh.points.sum(axis=1)), 0] = True
     top = mesh.outline_edges(1, mesh.points[:, 1].max())
@@ -82,13 +81,13 @@ def half_disc(edge, largest=0.12, grading=0.3):
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
     inverted = signed_areas(points, triangles) < 0
     triangles[inverted] = triangles[inverted][:, ::-1]
-    return Mesh(points, triangles)
+    return st.Mesh(points, triangles)
 
 
 def hertz(edge, half_width=0.06, **mesh):
     """Peak pressure and half width of a disc on a flat over Hertz's, E = 1, plane stress."""
     mesh = half_disc(edge, **mesh)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material(1.0, 0.3, name="unit"), 1.0)
+    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1.0, 0.3, name="unit"), 1.0)
     held = np.zeros(mesh.points.shape, dtype=bool)
     top = mesh.outline_edges(1, 1.0)
     held[top, 0] = True
@@ -128,7 +127,7 @@ def test_hertz_on_a_mesh_that_is_fine_below_the_contact_too():
 
 @pytest.mark.parametrize("mesh_type", ["free", "braced", "structured"])
 def test_outline_has_the_body_on_its_left(mesh_type):
-    mesh = MESH_TYPES[mesh_type](0.02, 0.01, 2.5e-3)
+    mesh = st.MESH_TYPES[mesh_type](0.02, 0.01, 2.5e-3)
     first, last = mesh.points[oriented_outline(mesh)].transpose(1, 0, 2)
     area = 0.5 * (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]).sum()
     assert area == pytest.approx(0.02 * 0.01, rel=1e-9)
@@ -245,9 +244,9 @@ def cap(radius, angle, corners):
 
 def pressed(mesh_type, size, obstacle, pressure):
     """A block of 20 x 10 mm whose upper face keeps its x, pressed on an obstacle, not quite in its middle."""
-    made = MESH_TYPES[mesh_type](0.02, 0.01, size)
-    mesh = Mesh(made.points - [0.01 - 0.13e-3, 0], made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material(1e6, 0.3, name="any"), 1e-3)
+    made = st.MESH_TYPES[mesh_type](0.02, 0.01, size)
+    mesh = st.Mesh(made.points - [0.01 - 0.13e-3, 0], made.triangles)
+    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1e6, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     top = mesh.outline_edges(1, mesh.points[:, 1].max())
     held[np.unique(top), 0] = True
@@ -289,9 +288,9 @@ def test_the_far_face_of_a_thin_sheet_is_no_contact():
 
 def draped(corners, size):
     """A sheet of 60 x 4 mm draped over a segment of a circle by its weight."""
-    made = MESH_TYPES["structured"](0.06, 0.004, size)
-    mesh = Mesh(made.points - [0.03, 0], made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material(1e6, 0.3, name="any"), 1e-3)
+    made = st.MESH_TYPES["structured"](0.06, 0.004, size)
+    mesh = st.Mesh(made.points - [0.03, 0], made.triangles)
+    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1e6, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.abs(mesh.points).sum(axis=1).argmin(), 0] = True
     weights = -0.3 * mesh.particle_areas / mesh.area
@@ -337,8 +336,8 @@ def test_a_force_along_the_floor_slips_at_the_limit():
 @pytest.mark.parametrize("way", [-1, 1])
 def test_sliding_friction_is_the_normal_force_times_the_coefficient(way):
     """A block pressed down by its upper face and pushed aside: all of the force that Coulomb allows, against it."""
-    made = MESH_TYPES["structured"](0.02, 0.004, 2e-3)
-    springs = DEFINITIONS["delingette"].springs(made, Material(1e6, 0.3, name="any"), 1e-3)
+    made = st.MESH_TYPES["structured"](0.02, 0.004, 2e-3)
+    springs = st.DEFINITIONS["delingette"].springs(made, st.Material(1e6, 0.3, name="any"), 1e-3)
     top = made.points[:, 1] > 0.004 - 1e-9
     held = np.repeat(top[:, None], 2, axis=1)
     prescribed = np.where(held, [way * 1e-3, -2e-5], 0.0)
@@ -357,13 +356,13 @@ def test_sliding_friction_is_the_normal_force_times_the_coefficient(way):
 def capstan(friction, wrap, size, radius=1e-2, thickness=4e-4, ratio=0.2):
     """Force that holds a belt over the one that pulls it, around a circle of finer edges, and the angle it turns by."""
     lead = 2e-3
-    made = MESH_TYPES["structured"](wrap * radius + 2 * lead, thickness, size)
+    made = st.MESH_TYPES["structured"](wrap * radius + 2 * lead, thickness, size)
     along = made.points[:, 0] - lead - 0.5 * wrap * radius
     angle = np.clip(along / radius, -0.5 * wrap, 0.5 * wrap)
     out, over = radius * (1 + 1e-6) + made.points[:, 1], along - angle * radius
     points = np.stack([out * np.sin(angle) + over * np.cos(angle), out * np.cos(angle) - over * np.sin(angle)], axis=1)
-    mesh = Mesh(points, made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material(1e6, 0.3, name="any"), 1e-3)
+    mesh = st.Mesh(points, made.triangles)
+    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1e6, 0.3, name="any"), 1e-3)
     held = np.repeat((along < along.min() + 1e-9)[:, None], 2, axis=1)
     end = np.flatnonzero(along > along.max() - 1e-9)
     end = end[np.argsort(made.points[end, 1])]

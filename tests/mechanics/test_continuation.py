@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
+import springtune as st
 from springtune.mechanics.continuation import buckling, follow, smallest_share
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.boundary import weights
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
 from springtune.reference.answers import elastica
 from springtune.scene.mesh_cache import MeshCache
-from springtune.springs import DEFINITIONS, Springs
 
 from problems import arch
 
@@ -25,8 +22,8 @@ HEIGHT = 0.02
 def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
     """A small beam under a load of about a strain, and that load over the reference stiffness."""
     length = aspect * HEIGHT
-    mesh = MESH_TYPES[mesh_type](length, HEIGHT, HEIGHT / rows)
-    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="sheet"), 1e-3)
+    mesh = st.MESH_TYPES[mesh_type](length, HEIGHT, HEIGHT / rows)
+    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(1e6, nu, name="sheet"), 1e-3)
     side = {AXIAL: HEIGHT, BENDING: HEIGHT**2 / length / 6, FACE: length, SHEAR: length}[kind]
     return MeshCache(mesh, 1e-3).problem(kind, springs), strain * 1e6 * 1e-3 * side / springs.reference
 
@@ -47,8 +44,8 @@ def test_a_path_goes_through_a_limit_point():
 @pytest.mark.parametrize("definition", ["delingette", "patch"])
 def test_a_slender_column_buckles_at_eulers_load(definition):
     """Clamped-free, 200 x 10 mm in ten rows: linear triangles are 1 % too stiff in bending."""
-    mesh = MESH_TYPES["structured"](0.2, 0.01, 1e-3)
-    springs = DEFINITIONS[definition].springs(mesh, Material(210e9, 0.3, name="steel"), 1e-3)
+    mesh = st.MESH_TYPES["structured"](0.2, 0.01, 1e-3)
+    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(210e9, 0.3, name="steel"), 1e-3)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.01**3 / 12 / (4 * 0.2**2)
     found, restriction = buckling(MeshCache(mesh, 1e-3).problem(AXIAL, springs), -euler / springs.reference)
     assert found * springs.reference == pytest.approx(-euler, rel=0.02) and not restriction
@@ -110,13 +107,13 @@ def test_an_equilibrium_behind_a_snap_is_not_called_solved(case):
 
 @settings(max_examples=25)
 @given(
-    st.sampled_from(["uniform", "lattice", "area", "delingette"]),
-    st.sampled_from([AXIAL, BENDING, FACE, SHEAR]),
-    st.sampled_from(["structured", "free", "right", "alternating"]),
-    st.floats(1.0, 12.0),
-    st.floats(-2.0, 0.5).flatmap(lambda size: st.sampled_from([-(10**size), 10**size])),
-    st.sampled_from([0.0, 0.3, 0.49, 0.5]),
-    st.integers(2, 4),
+    some.sampled_from(["uniform", "lattice", "area", "delingette"]),
+    some.sampled_from([AXIAL, BENDING, FACE, SHEAR]),
+    some.sampled_from(["structured", "free", "right", "alternating"]),
+    some.floats(1.0, 12.0),
+    some.floats(-2.0, 0.5).flatmap(lambda size: some.sampled_from([-(10**size), 10**size])),
+    some.sampled_from([0.0, 0.3, 0.49, 0.5]),
+    some.integers(2, 4),
 )
 def test_what_is_solved_lies_on_the_stable_path_from_rest(definition, kind, mesh_type, aspect, strain, nu, rows):
     """Whatever the load: in balance, stable, not inverted, and where arc length arrives in small steps."""
@@ -142,10 +139,10 @@ def test_what_is_solved_lies_on_the_stable_path_from_rest(definition, kind, mesh
 @pytest.mark.parametrize("kind", [AXIAL, BENDING])
 def test_stiffness_contrast_is_solved_or_reported(contrast, kind):
     """Up to 1e12: nearly the digits that a number has are left then."""
-    mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+    mesh = st.MESH_TYPES["structured"](0.1, 0.02, 5e-3)
     middle = mesh.points[mesh.edges].mean(axis=1)[:, 0]
     stiffness = 0.5 * mesh.cells_per_edge * np.where(middle // 0.02 % 2 == 0, 1.0, contrast)
-    problem = MeshCache(mesh, 1.0).problem(kind, Springs(1.0, stiffness))
+    problem = MeshCache(mesh, 1.0).problem(kind, st.Springs(1.0, stiffness))
     found = problem.linear(1e-6)
     assert found.converged == (contrast <= 1e12)
     if found.converged:
@@ -204,7 +201,7 @@ def test_just_above_the_critical_load_nothing_is_solved_that_is_unstable(mesh_ty
         status, message, pivots = problem.judge(load, found)
         if found.converged:
             assert (np.linalg.eigvalsh(problem.network.tangent(found.displacements).toarray())[0] > 0) == (pivots == 0)
-        assert (status is Status.SOLVED) == stable
+        assert (status is st.Status.SOLVED) == stable
 
 
 @pytest.mark.parametrize("definition", ["delingette", "lattice"])
@@ -216,14 +213,14 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     """
     height = 0.02
     length = slenderness * height
-    mesh = MESH_TYPES["structured"](length, height, height / 4)
-    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="sheet"), 1e-3)
+    mesh = st.MESH_TYPES["structured"](length, height, height / 4)
+    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(1e6, 0.3, name="sheet"), 1e-3)
     pattern = weights(mesh, BENDING)
     problem = MeshCache(mesh, 1e-3).problem(BENDING, springs)
     linear = float(np.tensordot(problem.slope, pattern, axes=2))
     s = ratio * length / (3 * linear)  # deflection F L^3 / 3 EI
     found = problem.nonlinear(s)
-    assert problem.judge(s, found)[0] is Status.SOLVED and found.error_estimate <= 1e-6
+    assert problem.judge(s, found)[0] is st.Status.SOLVED and found.error_estimate <= 1e-6
     deflection = float(np.tensordot(found.displacements, pattern, axes=2)) / length
     # Shear and stretch are of the order of (H / L)^2, strains of up to ratio H / 2 L of their square.
     assert deflection == pytest.approx(elastica(ratio), rel=(5 + ratio**2) / slenderness**2)
@@ -234,11 +231,11 @@ def test_what_snaps_has_a_limit_point_and_no_buckling_load():
     angle = np.linspace(-0.2, 0.2, 13)
     inner = np.stack([np.sin(angle), np.cos(angle)], axis=1)
     cells = [corners for i in range(12) for corners in ([i, i + 14, i + 13], [i, i + 1, i + 14])]
-    mesh = Mesh(np.concatenate([inner, 1.02 * inner]), np.array(cells))
+    mesh = st.Mesh(np.concatenate([inner, 1.02 * inner]), np.array(cells))
     clamped = np.zeros((26, 2), dtype=bool)
     clamped[[0, 12, 13, 25]] = True
     crown = np.zeros((26, 2))
     crown[19, 1] = 1.0
     problem = StaticProblem(Network(mesh, clamped, np.ones(len(mesh.edges))), crown)
-    assert problem.judge(-1.0, problem.nonlinear(-1.0))[0] is Status.UNSTABLE
+    assert problem.judge(-1.0, problem.nonlinear(-1.0))[0] is st.Status.UNSTABLE
     assert np.isnan(buckling(problem, -1e-2).load)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import springtune as st
 from springtune.mechanics import stepping
 from springtune.mechanics.continuation import buckling
 from springtune.mechanics.dynamics import Motion, masses, relax
@@ -13,14 +14,12 @@ from springtune.mechanics.integrators import EXPLICIT, INTEGRATORS, BackwardEule
 from springtune.mechanics.moduli import ends
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh, lattice
+from springtune.mesh import lattice
 from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL, BENDING
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import uniform
 
-STEEL = Material(210e9, 0.3, name="steel")
+STEEL = st.Material(210e9, 0.3, name="steel")
 DENSITY = 7850.0
 THICKNESS = 1e-3
 
@@ -29,8 +28,8 @@ def beam(
     definition="lattice", force=20e3, size=5e-3, mesh_type="structured", length=0.1, network_type=Network, **options
 ):
     """A clamped beam of steel, pulled at its end, with its true masses."""
-    mesh = MESH_TYPES[mesh_type](length, 0.02, size)
-    springs = DEFINITIONS[definition].springs(mesh, STEEL, THICKNESS)
+    mesh = st.MESH_TYPES[mesh_type](length, 0.02, size)
+    springs = st.DEFINITIONS[definition].springs(mesh, STEEL, THICKNESS)
     network = network_type(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
     inertia = masses(mesh, DENSITY, THICKNESS) / springs.reference
     return Motion(network, inertia, force / springs.reference * weights(mesh, AXIAL), **options)
@@ -49,7 +48,7 @@ def damped(motion):
 
 def oscillator(**options):
     """One particle on one spring along x: a mass of 1 and a stiffness of 1 over the reference, omega = 1."""
-    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
     directions = np.array([[True, True], [False, True], [True, True]])
     stiffness = np.where((mesh.edges == [0, 1]).all(axis=1), 1.0, 0.0)
     return Motion(Network(mesh, directions, stiffness), np.ones(3), linear=True, **options)
@@ -63,9 +62,9 @@ def centre(mesh, masses):
     return masses @ mesh.points / masses.sum()
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_masses_have_the_total_and_the_centre_of_the_beam(mesh_type):
-    mesh = MESH_TYPES[mesh_type](0.1, 0.02, 4e-3)
+    mesh = st.MESH_TYPES[mesh_type](0.1, 0.02, 4e-3)
     found = masses(mesh, DENSITY, THICKNESS)
     assert found.sum() == pytest.approx(DENSITY * 0.1 * 0.02 * THICKNESS, rel=1e-9)
     assert centre(mesh, found) == pytest.approx([0.05, 0.01], rel=1e-9)
@@ -73,10 +72,10 @@ def test_masses_have_the_total_and_the_centre_of_the_beam(mesh_type):
 
 def test_a_quarter_of_a_trapezoid_to_each_corner_moves_its_centre():
     """The paper's "same inertia centre" holds for parallelograms only: bases 4 and 1, height 1."""
-    mesh = Mesh(np.array([[0, 0], [4, 0], [1, 1], [0, 1]], dtype=float), np.zeros((0, 3), dtype=int),
+    mesh = st.Mesh(np.array([[0, 0], [4, 0], [1, 1], [0, 1]], dtype=float), np.zeros((0, 3), dtype=int),
                 np.array([[0, 1, 2, 3]]))  # fmt: skip
     assert centre(mesh, masses(mesh, 1.0, 1.0)) == pytest.approx([1.25, 0.5])
-    halves = Mesh(mesh.points, np.array([[0, 1, 2], [0, 2, 3]]))
+    halves = st.Mesh(mesh.points, np.array([[0, 1, 2], [0, 2, 3]]))
     assert centre(halves, masses(halves, 1.0, 1.0)) == pytest.approx([1.4, 0.4])
 
 
@@ -330,7 +329,7 @@ def chain(count, **options):
     cells = np.concatenate([np.stack([i, i + 1, i + count + 2], 1), np.stack([i, i + count + 2, i + count + 1], 1)])
     directions = np.ones(points.shape, dtype=bool)
     directions[1:count, 0] = False
-    mesh = Mesh(points, cells)
+    mesh = st.Mesh(points, cells)
     stiffness = (mesh.edges[:, 1] == mesh.edges[:, 0] + 1) & (mesh.edges[:, 1] <= count)
     return Motion(Network(mesh, directions, stiffness.astype(float)), np.ones(len(points)), **options)
 
@@ -445,8 +444,8 @@ def column(share, sideways=0.0, linear=False):
 
     Pressed by a share of that load, and pushed sideways by a share of the pressing force.
     """
-    mesh = MESH_TYPES["braced"](0.1, 0.01, 5e-3)
-    springs = DEFINITIONS["lattice"].springs(mesh, STEEL, THICKNESS)
+    mesh = st.MESH_TYPES["braced"](0.1, 0.01, 5e-3)
+    springs = st.DEFINITIONS["lattice"].springs(mesh, STEEL, THICKNESS)
     network = Network(mesh, held(mesh, AXIAL), springs.relative)
     euler = np.pi**2 * STEEL.young_modulus * THICKNESS * 0.01**3 / 12 / (4 * 0.1**2)
     along, across = weights(mesh, AXIAL), weights(mesh, BENDING)
@@ -505,7 +504,7 @@ def test_a_column_pushed_sideways_rests_bent(way):
 
 def test_rest_on_a_singular_tangent_is_unstable():
     """Two springs in a line: nothing holds the particle between them sideways, as at a limit point."""
-    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]), np.array([[0, 1, 3], [1, 2, 3]]))
+    mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]), np.array([[0, 1, 3], [1, 2, 3]]))
     directions = np.ones((4, 2), dtype=bool)
     directions[1] = False
     level = (mesh.points[mesh.edges][:, :, 1] == 0).all(axis=1)

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 from scipy.sparse import csc_array
 
+import springtune as st
 from springtune.linalg.factors import SingularError, SuperLUFactor
 from springtune.mechanics.energies import (
     AngleEnergy,
@@ -17,13 +18,11 @@ from springtune.mechanics.energies import (
     StableNeoHookeEnergy,
     YeohEnergy,
 )
-from springtune.mesh import MESH_TYPES
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
 
 from problems import beam_problem, free_network
 
 RATIOS = {"neo-Hooke": 0.3, "neo-Hooke, nearly incompressible": 0.4999}
+TYPES = ["structured", "free"]
 KINDS = (
     *("area of triangles", "area of quads", "angles", "angles of corners", "tensile", "coupled"),
     *("Yeoh", "stable neo-Hooke", *RATIOS),
@@ -33,7 +32,7 @@ KINDS = (
 def energy_of(kind, seed):
     """An energy of random moduli on a small mesh, which is returned, too."""
     generator = np.random.default_rng(seed)
-    mesh = MESH_TYPES["braced" if "quads" in kind else "free"](0.02, 0.01, 5e-3)
+    mesh = st.MESH_TYPES["braced" if "quads" in kind else "free"](0.02, 0.01, 5e-3)
     corners = mesh.quads if "quads" in kind else mesh.triangles
     modulus = generator.uniform(-0.5, 1.0, len(corners))
     if kind == "Yeoh":
@@ -65,7 +64,7 @@ def assembled(mesh, corners, forces):
 
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=15)
-@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 4e-4))
+@given(seed=some.integers(0, 2**31), amplitude=some.floats(1e-6, 4e-4))
 def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
     mesh, energy = energy_of(kind, seed)
     here, direction = scattered(mesh, seed + 1, amplitude), scattered(mesh, seed + 2, 1.0)
@@ -80,7 +79,7 @@ def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
 
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=15)
-@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 4e-4))
+@given(seed=some.integers(0, 2**31), amplitude=some.floats(1e-6, 4e-4))
 def test_tangent_is_the_derivative_of_the_forces(kind, seed, amplitude):
     mesh, energy = energy_of(kind, seed)
     here, direction = scattered(mesh, seed + 1, amplitude), scattered(mesh, seed + 2, 1.0)
@@ -102,7 +101,7 @@ def test_tangent_is_symmetric_and_that_at_rest_is_the_limit(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@given(angle=st.floats(-3.1, 3.1), shift=st.floats(-1, 1))
+@given(angle=some.floats(-3.1, 3.1), shift=some.floats(-1, 1))
 @settings(max_examples=15)
 def test_rigid_motion_costs_nothing(kind, angle, shift):
     mesh, energy = energy_of(kind, 5)
@@ -192,9 +191,9 @@ WITH_ENERGIES = [
 @pytest.mark.parametrize("name", WITH_ENERGIES)
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_free_networks_have_three_rigid_motions_and_no_other(name, nu):
-    definition = DEFINITIONS[name]
-    mesh = MESH_TYPES["free" if 3 in definition.cells else "braced"](0.03, 0.01, 2.5e-3)
-    springs = definition.springs(mesh, Material(1.0, nu, name="unit"), 1.0)
+    definition = st.DEFINITIONS[name]
+    mesh = st.MESH_TYPES["free" if 3 in definition.cells else "braced"](0.03, 0.01, 2.5e-3)
+    springs = definition.springs(mesh, st.Material(1.0, nu, name="unit"), 1.0)
     network = free_network(mesh, springs)
     eigenvalues = np.linalg.eigvalsh(network.tangent().toarray())
     assert np.abs(eigenvalues[:3]).max() <= 1e-9 * eigenvalues[-1]
@@ -209,7 +208,9 @@ def bent(problem, seed, amplitude):
 
 
 @settings(max_examples=20)
-@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 5e-4), mesh_type=st.sampled_from(["structured", "free"]))
+@given(
+    seed=some.integers(0, 2**31), amplitude=some.floats(1e-6, 5e-4), mesh_type=some.sampled_from(["structured", "free"])
+)
 def test_tangent_is_the_derivative_of_the_resistance(seed, amplitude, mesh_type):
     problem, _ = beam_problem(mesh_type)
     network = problem.network
@@ -224,7 +225,7 @@ def test_tangent_is_the_derivative_of_the_resistance(seed, amplitude, mesh_type)
 
 
 @settings(max_examples=20)
-@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-5, 5e-4))
+@given(seed=some.integers(0, 2**31), amplitude=some.floats(1e-5, 5e-4))
 def test_resistance_is_the_derivative_of_the_energy(seed, amplitude):
     problem, _ = beam_problem("free")
     network = problem.network
@@ -236,7 +237,7 @@ def test_resistance_is_the_derivative_of_the_energy(seed, amplitude):
     assert abs(difference / (2 * step) - work) <= 1e-6 * scale
 
 
-@given(angle=st.floats(-3.1, 3.1), shift=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
+@given(angle=some.floats(-3.1, 3.1), shift=some.tuples(some.floats(-1, 1), some.floats(-1, 1)))
 @settings(max_examples=30)
 def test_rigid_motion_meets_no_resistance(angle, shift):
     problem, _ = beam_problem()

@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+import springtune as st
 from periodic import affine_stiffness, periodic_delaunay, periodic_stiffness
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.moduli import (
-    PatchTest,
-    free_body,
-    mean_gradient,
-    outline_forces,
-)
+from springtune.mechanics.moduli import PatchTest, free_body, mean_gradient, outline_forces
 from springtune.mechanics.network import Network
-from springtune.mesh import Mesh, signed_areas
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
+from springtune.mesh import signed_areas
 
 LATTICE = 3**0.5 / 4, 3**0.5 / 2
 """Shear and area modulus over k of the equilateral lattice: 0.433 and 0.866."""
@@ -86,9 +80,9 @@ def test_where_the_period_is_cut_does_not_count():
 @pytest.mark.parametrize("name", ["delingette", "ielsm"])
 def test_exact_definitions_are_the_material_on_random_triangles(name, nu):
     mesh, copied = periodic_delaunay(np.random.default_rng(4).uniform(size=(80, 2)), 1.0, 1.0)
-    springs = DEFINITIONS[name].springs(mesh, Material(1.0, nu), 1.0)
+    springs = st.DEFINITIONS[name].springs(mesh, st.Material(1.0, nu), 1.0)
     stiffness = springs.reference * periodic_stiffness(mesh, copied, springs)
-    np.testing.assert_allclose(stiffness, Material(1.0, nu).plane_stress, atol=1e-9)
+    np.testing.assert_allclose(stiffness, st.Material(1.0, nu).plane_stress, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])  # whose period is one body
@@ -135,7 +129,7 @@ def held_by_its_outline(count, moved, seed):
     triangles = triangles[(np.linalg.norm(points[triangles], axis=2) < radius).all(axis=1)]
     turned = signed_areas(points, triangles) < 0
     used, places = np.unique(np.where(turned[:, None], triangles[:, ::-1], triangles), return_inverse=True)
-    mesh = Mesh(points[used], places.reshape(-1, 3))
+    mesh = st.Mesh(points[used], places.reshape(-1, 3))
     return shear_and_area(PatchTest(mesh).stiffness(SimpleNamespace(relative=np.ones(len(mesh.edges)), energies=())))
 
 

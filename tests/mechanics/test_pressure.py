@@ -3,29 +3,25 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
+import springtune as st
 from springtune.mechanics.network import FollowerPressure
 from springtune.mechanics.newton import MOST_MODES
 from springtune.mechanics.statics import FAR_STRETCH
-from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import measured
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import FACE
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
-from springtune.springs import DEFINITIONS
 
-BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")
+BLOCK = st.Beam(0.2, 0.04, 1e-3, "200x40")
 FORCE = -20.0  # .1 MPa on 200 x 1 mm
 
 
 def pressed(definition, length, height, size, nu=0.3, stiffness=None, mesh_type="structured", follower=False):
     """A sheet that stands on its lower side pressed from above, its mesh, and its reference stiffness."""
-    mesh = MESH_TYPES[mesh_type](length, height, size)
-    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="rubber"), 1e-3, stiffness)
+    mesh = st.MESH_TYPES[mesh_type](length, height, size)
+    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(1e6, nu, name="rubber"), 1e-3, stiffness)
     return MeshCache(mesh, 1e-3).problem(FACE, springs, follower), mesh, springs.reference
 
 
@@ -48,7 +44,7 @@ def middle(found, field):
 @pytest.mark.parametrize("definition", ["area", "delingette"])
 def test_one_set_of_parameters_serves_the_block_too(definition, nu):
     problem, s, field = block(definition, nu)
-    reference = solve_small_strain(BLOCK, Material(1e6, nu, name="rubber"), FORCE, kind=FACE)
+    reference = solve_small_strain(BLOCK, st.Material(1e6, nu, name="rubber"), FORCE, kind=FACE)
     assert middle(problem.linear(s), field) == pytest.approx(reference.displacement, rel=0.01)
 
 
@@ -73,9 +69,9 @@ def test_softer_network_snaps_at_its_corners_and_keeps_the_last_good_step():
 
 
 @settings(max_examples=15)
-@given(seed=st.integers(0, 2**31), axis=st.integers(0, 1))
+@given(seed=some.integers(0, 2**31), axis=some.integers(0, 1))
 def test_follower_pressure_has_its_derivative(seed, axis):
-    mesh = MESH_TYPES["free"](0.02, 0.01, 2.5e-3)
+    mesh = st.MESH_TYPES["free"](0.02, 0.01, 2.5e-3)
     edges = mesh.outline_edges(1 - axis, mesh.points[:, 1 - axis].max())
     load = FollowerPressure.of_side(mesh, edges, axis)
     generator = np.random.default_rng(seed)
@@ -111,7 +107,7 @@ def test_load_steps_under_a_follower_pressure_are_stable_where_its_own_share_of_
     found = problem.nonlinear(-s)
     assert problem.network.largest_change(found.displacements) > FAR_STRETCH
     assert found.converged and np.isnan(found.unstable_share)
-    assert problem.judge(-s, found)[0] is Status.SOLVED
+    assert problem.judge(-s, found)[0] is st.Status.SOLVED
 
 
 def frequencies(problem, s, displacements):
@@ -134,7 +130,7 @@ def test_a_tall_sheet_under_a_follower_pressure_is_solved_only_where_it_does_not
     assert found.converged and pivots == 0  # inertia has nothing to say
     lowest = frequencies(problem, strain * unit, found.displacements)[:MOST_MODES]
     flutters = (np.abs(lowest.imag) > 1e-6 * np.abs(lowest)).any()
-    assert status == (Status.UNSTABLE if flutters else Status.SOLVED)
+    assert status == (st.Status.UNSTABLE if flutters else st.Status.SOLVED)
     assert ("flutters" in message) == flutters
     modes = problem.modes(strain * unit, found.displacements, found.factor)
     assert np.sort(np.abs(modes)) == pytest.approx(np.abs(lowest), rel=1e-6)
@@ -145,11 +141,11 @@ def test_a_slender_column_flutters_at_becks_load():
 
     def critical(follower, low, high):
         problem, unit = column("delingette", 0.01, 0.2, 2.5e-3, follower)
-        assert problem.judge(low * unit, problem.nonlinear(low * unit))[0] is Status.SOLVED
-        assert problem.judge(high * unit, problem.nonlinear(high * unit))[0] is Status.UNSTABLE
+        assert problem.judge(low * unit, problem.nonlinear(low * unit))[0] is st.Status.SOLVED
+        assert problem.judge(high * unit, problem.nonlinear(high * unit))[0] is st.Status.UNSTABLE
         while high - low > 2e-3 * high:
             middle = 0.5 * (low + high)
-            stable = problem.judge(middle * unit, problem.nonlinear(middle * unit))[0] is Status.SOLVED
+            stable = problem.judge(middle * unit, problem.nonlinear(middle * unit))[0] is st.Status.SOLVED
             low, high = (middle, high) if stable else (low, middle)
         return high
 

@@ -3,23 +3,19 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
+import springtune as st
 from springtune.mechanics.continuation import follow, smallest_share
 from springtune.mechanics.expansion import SERIES_ORDER, Expansion
 from springtune.mechanics.network import Network
 from springtune.mechanics.series import StablePath, trace
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import best_stiffness
-from springtune.problem.geometry import Beam
-from springtune.problem.loads import AXIAL, BENDING, FACE, LOADS, SHEAR
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
-from springtune.springs import Springs
 from springtune.springs.lattice import COEFFICIENT, uniform
 
 from problems import beam_problem
@@ -55,7 +51,7 @@ def on_the_path(problem, weights, s):
     A separate solve; where that finds an equilibrium that the beam leaves, by arc length.
     """
     found = problem.nonlinear(s)
-    if problem.judge(s, found)[0] is Status.SOLVED:
+    if problem.judge(s, found)[0] is st.Status.SOLVED:
         return float(np.tensordot(found.displacements, weights, axes=2))
     for length in (0.02, 0.2):  # short of the turn, long of the way beyond it
         increment = length * abs(s) * np.linalg.norm(problem.slope)
@@ -81,11 +77,11 @@ def random_curve(seed):
         height = random.uniform(5e-3, 30e-3)
         size, length = height / random.uniform(1.5, 8), height * random.uniform(1, 12)
         if 15 < length * height / size**2 < 300:
-            mesh = MESH_TYPES[mesh_type](length, height, size)
+            mesh = st.MESH_TYPES[mesh_type](length, height, size)
             if len(mesh.points) <= 400:
                 break
     kind = random.choice([AXIAL, AXIAL, AXIAL, BENDING, SHEAR, FACE])
-    problem = MeshCache(mesh, 1.0).problem(kind, Springs(1.0, uniform(mesh)))
+    problem = MeshCache(mesh, 1.0).problem(kind, st.Springs(1.0, uniform(mesh)))
     sign, s = random.choice([-1, 1]), height * 10 ** random.uniform(-2, 0.3)
     if kind != AXIAL or sign < 0:
         small = 1e-6 * sign * height
@@ -138,14 +134,14 @@ def test_best_stiffness_is_of_a_stable_equilibrium(mesh_type, best):
     force, stiffness = -0.548311, RATIOS * COEFFICIENT * 1e3
     path = StablePath(problem, weights, force / stiffness)
     reference = solve_small_strain(
-        Beam(0.06, 0.02, 1e-3, "60x20"), Material(1e6, 0.5, name="rubber"), force
+        st.Beam(0.06, 0.02, 1e-3, "60x20"), st.Material(1e6, 0.5, name="rubber"), force
     ).displacement
     solve = lambda stiffness: path.value(force / stiffness)  # noqa: E731
     found = best_stiffness(stiffness, path.values, path.stable, reference, solve)
     if best is None:
-        assert (found.status, path.end) == (Status.UNSTABLE, "unstable") and np.isnan(found.stiffness)
+        assert (found.status, path.end) == (st.Status.UNSTABLE, "unstable") and np.isnan(found.stiffness)
         return
-    assert found.status is Status.SOLVED and found.stiffness == pytest.approx(best, abs=5e-3)
+    assert found.status is st.Status.SOLVED and found.stiffness == pytest.approx(best, abs=5e-3)
     assert on_the_path(problem, weights, force / found.stiffness) == pytest.approx(reference, rel=1e-6)
 
 
@@ -165,7 +161,7 @@ def test_series_error_falls_with_the_order():
 
 
 @settings(max_examples=10)
-@given(share=st.floats(0.05, 1.0))
+@given(share=some.floats(0.05, 1.0))
 def test_series_about_a_loaded_point_meets_that_about_rest(share):
     problem, weights = beam_problem("free", 0.1, 0.02, 5e-3)
     s = share * 20e3 / K
@@ -191,7 +187,7 @@ class Counted(Network):
 
 def test_one_path_is_many_solves_worth():
     """Two hundred stiffnesses on one path take no more factorizations than one of them solved by itself."""
-    mesh, kind = MESH_TYPES["structured"](0.1, 0.02, 5e-3), LOADS["traction"].kind
+    mesh, kind = st.MESH_TYPES["structured"](0.1, 0.02, 5e-3), st.LOADS["traction"].kind
     pattern = weights(mesh, kind)
 
     def problem():

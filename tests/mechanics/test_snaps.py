@@ -7,7 +7,6 @@ import springtune as st
 from arches import Arch, draw, limit
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.dynamics import relax
-from springtune.problem.status import Status
 
 from problems import pulled
 
@@ -25,9 +24,9 @@ def check(arch, shares):
     found, how = statuses(arch, shares)
     for share, (status, message) in found.items():
         if share < 1:
-            assert (status, message) == (Status.SOLVED, ""), (arch, share)
+            assert (status, message) == (st.Status.SOLVED, ""), (arch, share)
         else:
-            assert status in (Status.UNSTABLE, Status.NOT_CONVERGED) and message, (arch, share)
+            assert status in (st.Status.UNSTABLE, st.Status.NOT_CONVERGED) and message, (arch, share)
             if how == "limit point" and "turns back" in message:
                 said = float(message.split("unstable at ")[1].split(" %")[0])
                 assert said == pytest.approx(100 / share, rel=0.01), (arch, share)
@@ -81,8 +80,8 @@ def pushed():
 def test_a_shape_that_snaps_is_unstable_and_says_where(pushed):
     """It carries some 6 mN; 10 mN it carries 52 mm below, behind the snap."""
     below, beyond = pushed(5e-3), pushed(10e-3)
-    assert below.status is Status.SOLVED and -15e-3 < below.values["crown"] < -5e-3
-    assert beyond.status is Status.UNSTABLE and "limit point: the path from rest turns back" in beyond.message
+    assert below.status is st.Status.SOLVED and -15e-3 < below.values["crown"] < -5e-3
+    assert beyond.status is st.Status.UNSTABLE and "limit point: the path from rest turns back" in beyond.message
     assert "after a snap the body reaches a stable equilibrium that carries the load" in beyond.message
     assert 5.5e-3 < 1e-4 * float(beyond.message.split("unstable at ")[1].split(" %")[0]) < 6.5e-3
     assert np.isnan(beyond.displacement)
@@ -92,8 +91,8 @@ def test_a_shape_that_snaps_is_unstable_and_says_where(pushed):
 @pytest.mark.parametrize(
     "size, status, says",
     [
-        ("6 mm", Status.UNSTABLE, "turns back and becomes unstable at 90."),
-        ("4 mm", Status.NOT_CONVERGED, "cells turn inside out beyond 8"),
+        ("6 mm", st.Status.UNSTABLE, "turns back and becomes unstable at 90."),
+        ("4 mm", st.Status.NOT_CONVERGED, "cells turn inside out beyond 8"),
     ],
 )
 def test_one_event_has_one_status(definition, size, status, says):
@@ -130,5 +129,5 @@ def test_an_arch_that_only_softens_is_solved(definition, share):
     assert not path.negative_pivots.any() and (np.diff(path.loads) > 0).all() and not path.message
     place = int(share * (len(path.loads) - 1))
     found = problem.nonlinear(path.loads[place])
-    assert problem.judge(path.loads[place], found)[:2] == (Status.SOLVED, "")
+    assert problem.judge(path.loads[place], found)[:2] == (st.Status.SOLVED, "")
     assert np.abs(found.displacements - path.displacements[place]).max() <= 1e-6 * np.abs(found.displacements).max()

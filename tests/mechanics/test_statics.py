@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
+import springtune as st
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mechanics.newton import TOLERANCE
 from springtune.mechanics.statics import SMALLEST_STEP, StaticProblem
-from springtune.mesh import Mesh
-from springtune.problem.status import Status
 
 from problems import arch, beam_problem
 
@@ -66,7 +65,7 @@ def test_an_arch_carries_its_closed_form_and_no_more(stiffness, beyond):
     assert 1 / beyond - SMALLEST_STEP <= found.load_share <= 1 / beyond
     assert f"beyond {100 * found.load_share:.3g} % of the load" in found.reason
     status, message, pivots = problem.judge(s, found)
-    assert status is Status.UNSTABLE and np.isnan(pivots)
+    assert status is st.Status.UNSTABLE and np.isnan(pivots)
     assert f"turns back and becomes unstable at {100 * found.limit_share:.3g} % of the load" in message
 
 
@@ -82,7 +81,7 @@ class Starts(StaticProblem):
 
 def propped_arch(prop, rise=0.3):
     """An arch whose particle hangs on a third spring, straight above it: its springs' law, and the problem."""
-    mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise], [0.0, 5.0]]), np.array([[0, 2, 3], [2, 1, 3]]))
+    mesh = st.Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise], [0.0, 5.0]]), np.array([[0, 2, 3], [2, 1, 3]]))
     held = np.array([[True, True], [True, True], [True, False], [True, True]])
     own = np.where((mesh.edges != 3).all(axis=1), 1.0, 0.0)
     stiffness = np.where((mesh.edges == [2, 3]).all(axis=1), prop, own)
@@ -139,7 +138,7 @@ def test_where_springs_snap_is_found_to_the_shortest_load_step(snap):
 
 def test_a_prescribed_end_moves_a_chain_by_its_closed_form():
     """Two springs in a row, one of twice the stiffness: between them two thirds of the end's displacement and load."""
-    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]), np.array([[0, 1, 3], [1, 2, 3]]))
+    mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]), np.array([[0, 1, 3], [1, 2, 3]]))
     held = np.array([[True, True], [False, True], [True, True], [True, True]])
     stiffness = np.where((mesh.edges == [0, 1]).all(axis=1), 1.0, 0.0) + 2 * (mesh.edges == [1, 2]).all(axis=1)
     given = np.zeros((4, 2))
@@ -193,7 +192,7 @@ def test_newton_starts_from_the_series_about_rest():
 @pytest.mark.parametrize(("stretch", "in_steps"), [(0.14, False), (0.16, True), (0.4, True)])
 def test_springs_stretched_far_are_solved_in_load_steps(stretch, in_steps):
     """A spring between a clamp and a roller is stretched by the force over its stiffness; far is beyond 15 %."""
-    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
     held = np.array([[True, True], [False, True], [True, True]])
     network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
     problem = Starts(network, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]))
@@ -207,7 +206,7 @@ def test_springs_stretched_far_are_solved_in_load_steps(stretch, in_steps):
 @pytest.mark.parametrize(("turn", "in_steps"), [(0.29, False), (0.31, True)])
 def test_springs_turned_far_are_solved_in_load_steps(turn, in_steps):
     """A rod turns about its clamp, which a long spring across hinders: far is a chord of 0.3 of its length."""
-    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, -10.0]]), np.array([[0, 2, 1]]))
+    mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, -10.0]]), np.array([[0, 2, 1]]))
     held = np.array([[True, True], [False, False], [True, True]])
     network = Network(mesh, held, np.where((mesh.edges == [0, 1]).all(axis=1), 10.0, 1.0))
     angle = 2 * np.arcsin(turn / 2)
@@ -230,24 +229,29 @@ class Singular:
 
 
 FLAWS = {
-    "none": ({}, Status.SOLVED, "", 0),
-    "limit beyond the load": ({"limit_share": 1.2}, Status.SOLVED, "", 0),
-    "unstable beyond the load": ({"unstable_share": 1.2}, Status.SOLVED, "", 0),
-    "limit at the load": ({"limit_share": 1.0}, Status.SOLVED, "", 0),
-    "unstable at the load": ({"unstable_share": 1.0}, Status.SOLVED, "", 0),
-    "limit": ({"limit_share": 0.123}, Status.UNSTABLE, "turns back and becomes unstable at 12.3 % of the load", np.nan),
+    "none": ({}, st.Status.SOLVED, "", 0),
+    "limit beyond the load": ({"limit_share": 1.2}, st.Status.SOLVED, "", 0),
+    "unstable beyond the load": ({"unstable_share": 1.2}, st.Status.SOLVED, "", 0),
+    "limit at the load": ({"limit_share": 1.0}, st.Status.SOLVED, "", 0),
+    "unstable at the load": ({"unstable_share": 1.0}, st.Status.SOLVED, "", 0),
+    "limit": (
+        {"limit_share": 0.123},
+        st.Status.UNSTABLE,
+        "turns back and becomes unstable at 12.3 %",
+        np.nan,
+    ),
     "no equilibrium": (
         {"converged": False, "reason": "no luck"},
-        Status.NOT_CONVERGED,
+        st.Status.NOT_CONVERGED,
         "no luck; last residual",
         np.nan,
     ),
-    "one pivot": ({"factor": SimpleNamespace(negative_pivots=1)}, Status.UNSTABLE, "(1 negative pivot)", 1),
-    "two pivots": ({"factor": SimpleNamespace(negative_pivots=2)}, Status.UNSTABLE, "(2 negative pivots)", 2),
-    "singular": ({"factor": Singular()}, Status.UNSTABLE, "limit point: the tangent is singular", np.nan),
+    "one pivot": ({"factor": SimpleNamespace(negative_pivots=1)}, st.Status.UNSTABLE, "(1 negative pivot)", 1),
+    "two pivots": ({"factor": SimpleNamespace(negative_pivots=2)}, st.Status.UNSTABLE, "(2 negative pivots)", 2),
+    "singular": ({"factor": Singular()}, st.Status.UNSTABLE, "limit point: the tangent is singular", np.nan),
     "path": (
         {"unstable_share": 0.25},
-        Status.UNSTABLE,
+        st.Status.UNSTABLE,
         "the path to this equilibrium is unstable at 25 % of the load",
         0,
     ),

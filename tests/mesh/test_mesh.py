@@ -6,13 +6,11 @@ import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 from scipy.spatial import Delaunay
 
+import springtune as st
 from springtune.mesh import (
-    MESH_TYPES,
-    Mesh,
-    MeshError,
     braced,
     free,
     isosceles,
@@ -27,18 +25,14 @@ from springtune.mesh import (
 from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.kinds.bodies.mesh import make
 
-boxes = {
-    "length": st.floats(0.02, 0.3),
-    "height": st.floats(0.01, 0.05),
-    "size": st.floats(2e-3, 9e-3),
-}
+boxes = {"length": some.floats(0.02, 0.3), "height": some.floats(0.01, 0.05), "size": some.floats(2e-3, 9e-3)}
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 @settings(max_examples=8)
 @given(**boxes)
 def test_any_box_is_covered_once(mesh_type, length, height, size):
-    mesh = MESH_TYPES[mesh_type](length, height, size)
+    mesh = st.MESH_TYPES[mesh_type](length, height, size)
     for corners in mesh.cells.values():
         assert (signed_areas(mesh.points, corners) > 0).all()
     assert mesh.area == pytest.approx(length * height, rel=1e-9)
@@ -57,7 +51,7 @@ def test_any_box_is_covered_once(mesh_type, length, height, size):
 @pytest.mark.parametrize("mesh_type", ["structured", "right", "free"])
 def test_counts_are_the_same_in_every_unit(mesh_type):
     """Two cells and a half are a half in every unit: rounding took two or three."""
-    kind, counts = MESH_TYPES[mesh_type], set()
+    kind, counts = st.MESH_TYPES[mesh_type], set()
     for unit in np.random.default_rng(1).uniform(1e-3, 1e3, 20):
         box = (7.5 * 0.1 * unit, 0.5 * unit, 0.3 * unit)
         counts.add(len(kind(*box).points))
@@ -93,17 +87,17 @@ def test_free_has_the_imposed_size_on_its_outline_and_is_delaunay(size):
 
 
 def test_quality_of_a_right_isosceles_triangle():
-    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
+    mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
     lengths = np.array([1.0, 1.0, np.sqrt(2)])
     expected = {"minimum_angle": 45.0, "edge_length_spread": lengths.std() / lengths.mean()}
     assert quality(mesh) == pytest.approx(expected)
 
 
 @pytest.mark.usefixtures("mesh_library")
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 @pytest.mark.parametrize("box", [(0.2, 0.04, 5e-3), (0.1, 0.005, 5e-3), (0.005, 0.1, 5e-3), (1.0, 1e-3, 1e-3)])
 def test_file_keeps_every_digit(tmp_path, mesh_type, box):
-    mesh = MESH_TYPES[mesh_type](*box)
+    mesh = st.MESH_TYPES[mesh_type](*box)
     write_mesh(tmp_path / "mesh.vtu", mesh)
     assert len(read_beam_mesh(tmp_path / "mesh.vtu", *box[:2]).edges) == len(mesh.edges)
     again = read_mesh(tmp_path / "mesh.vtu")
@@ -131,7 +125,7 @@ HALVES = [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]
 def test_files_that_are_no_plane_mesh_are_refused(tmp_path, points, cells, message):
     path = tmp_path / "mesh.vtu"
     meshio.Mesh(points, cells).write(path)
-    with pytest.raises(MeshError, match=f"mesh.vtu: .*{message}"):
+    with pytest.raises(st.MeshError, match=f"mesh.vtu: .*{message}"):
         read_mesh(path)
 
 
@@ -139,7 +133,7 @@ def test_files_that_are_no_plane_mesh_are_refused(tmp_path, points, cells, messa
 def test_unreadable_file_is_refused(tmp_path):
     for name, content in (("mesh.txt", "nothing"), ("mesh.vtu", "nothing"), ("mesh.msh", "$MeshFormat")):
         (tmp_path / name).write_text(content)
-        with pytest.raises(MeshError, match=f"{name}: (cannot be read|unknown format).*(convert|write) it"):
+        with pytest.raises(st.MeshError, match=f"{name}: (cannot be read|unknown format).*(convert|write) it"):
             read_mesh(tmp_path / name)
 
 
@@ -151,7 +145,7 @@ FORMATS = {"vtu": "vtu", "med": "med", "gmsh22": "msh", "abaqus": "inp"}
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("mesh_type", ["free", "braced"])
 def test_a_beam_may_come_from_any_format(tmp_path, name, mesh_type):
-    mesh = MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)
+    mesh = st.MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)
     # Elsewhere, in mm, with a particle of no cell and with lines on the outline; the first cell clockwise.
     points = np.column_stack([1e3 * mesh.points + [7.0, -3.0], np.zeros(len(mesh.points))])
     points = np.vstack([points, [[50.0, 10.0, 0.0]]])
@@ -170,10 +164,10 @@ def test_a_beam_may_come_from_any_format(tmp_path, name, mesh_type):
 
 
 def test_a_mesh_that_does_not_fill_its_beam_is_refused(tmp_path):
-    mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
+    mesh = st.MESH_TYPES["free"](0.1, 0.02, 5e-3)
     path = tmp_path / "beam.vtu"
     write_mesh(path, mesh)
-    with pytest.raises(MeshError, match="extends over 100 x 20 mm, its beam over 200 x 40 mm; correct the unit"):
+    with pytest.raises(st.MeshError, match="extends over 100 x 20 mm, its beam over 200 x 40 mm; correct the unit"):
         read_beam_mesh(path, 0.2, 0.04)
 
 
@@ -186,7 +180,7 @@ def save(path, points, cells):
 
 def refuse(path, points, cells, said, length=0.1, height=0.02):
     """Assert that a file is no mesh of a beam, and what is said of it."""
-    with pytest.raises(MeshError, match=said):
+    with pytest.raises(st.MeshError, match=said):
         read_beam_mesh(save(path, points, cells), length, height)
 
 
@@ -217,7 +211,7 @@ def part(mesh, chosen, joint, gap=0.0):
 class TestSlits:
     """Meshes whose cells cover the box once, by their areas, but are not joined throughout."""
 
-    MESH = MESH_TYPES["right"](0.1, 0.02, 5e-3)
+    MESH = st.MESH_TYPES["right"](0.1, 0.02, 5e-3)
 
     def test_a_file_that_changes_during_a_run_is_not_read(self, tmp_path):
         """Its mesh would be stored under the key of what it held before."""
@@ -232,7 +226,7 @@ class TestSlits:
         # Of a limit that somebody else has set, and that is tighter than that of reading a file.
         resource.setrlimit(resource.RLIMIT_AS, (virtual_memory() + 10**8, before[1]))
         try:
-            with pytest.raises(MeshError, match="is damaged"):
+            with pytest.raises(st.MeshError, match="is damaged"):
                 read_beam_mesh(path, 0.1, 0.02)
         finally:
             resource.setrlimit(resource.RLIMIT_AS, before)
@@ -247,7 +241,7 @@ class TestSlits:
         refuse(tmp_path / "holes.vtu", mesh.points, {3: np.delete(mesh.triangles, opposite, axis=0)}, said)
 
     def test_sheets_on_top_of_each_other(self, tmp_path):
-        mesh, other = self.MESH, MESH_TYPES["alternating"](0.1, 0.02, 5e-3)
+        mesh, other = self.MESH, st.MESH_TYPES["alternating"](0.1, 0.02, 5e-3)
         apart, points = np.vstack([mesh.triangles, other.triangles + len(mesh.points)]), [mesh.points, other.points]
         said = "cover 200 % of the box or overlap: two points at .*, do not join their cells"
         refuse(tmp_path / "two.vtu", np.vstack(points), {3: apart}, said)
@@ -255,7 +249,7 @@ class TestSlits:
         refuse(tmp_path / "one.vtu", mesh.points, {3: np.vstack([mesh.triangles, other.triangles])}, said)
 
     def test_triangles_beside_quadrilaterals_and_slivers_are_legal(self, tmp_path):
-        mesh = MESH_TYPES["braced"](0.1, 0.02, 5e-3)
+        mesh = st.MESH_TYPES["braced"](0.1, 0.02, 5e-3)
         half = mesh.points[mesh.quads].mean(axis=1)[:, 0] < 0.05
         triangles = np.vstack([mesh.quads[half][:, [0, 1, 2]], mesh.quads[half][:, [0, 2, 3]]])
         points = mesh.points.copy()
@@ -266,15 +260,15 @@ class TestSlits:
 
     @settings(max_examples=25)
     @given(
-        mesh_type=st.sampled_from(sorted(MESH_TYPES)),
-        angle=st.floats(0, np.pi),
-        seed=st.integers(0, 2**32 - 1),
-        gap=st.sampled_from([0.0, 1e-12, 1e-9]),
+        mesh_type=some.sampled_from(sorted(st.MESH_TYPES)),
+        angle=some.floats(0, np.pi),
+        seed=some.integers(0, 2**32 - 1),
+        gap=some.sampled_from([0.0, 1e-12, 1e-9]),
         **boxes,
     )
     def test_any_slit_is_refused(self, tmp_path_factory, mesh_type, angle, seed, gap, length, height, size):
         """A line through the box, random points of the joint along it doubled: refused; the mesh itself is not."""
-        mesh, path = MESH_TYPES[mesh_type](length, height, size), tmp_path_factory.mktemp("any") / "mesh.vtu"
+        mesh, path = st.MESH_TYPES[mesh_type](length, height, size), tmp_path_factory.mktemp("any") / "mesh.vtu"
         found = read_beam_mesh(save(path, mesh.points, mesh.cells), length, height)
         assert len(found.edges) == len(mesh.edges)
         random = np.random.default_rng(seed)
@@ -291,10 +285,12 @@ class TestSlits:
             read_beam_mesh(save(path, points, cells), length, height)
 
     @settings(max_examples=20)
-    @given(mesh_type=st.sampled_from(sorted(set(MESH_TYPES) - {"braced"})), seed=st.integers(0, 2**32 - 1), **boxes)
+    @given(
+        mesh_type=some.sampled_from(sorted(set(st.MESH_TYPES) - {"braced"})), seed=some.integers(0, 2**32 - 1), **boxes
+    )
     def test_any_hanging_point_is_refused(self, tmp_path_factory, mesh_type, seed, length, height, size):
         """A point on an edge inside that splits one of its two triangles."""
-        mesh, random = MESH_TYPES[mesh_type](length, height, size), np.random.default_rng(seed)
+        mesh, random = st.MESH_TYPES[mesh_type](length, height, size), np.random.default_rng(seed)
         inner = np.flatnonzero(mesh.cells_per_edge == 2)
         if not len(inner):
             return
@@ -325,7 +321,7 @@ def test_points_that_are_nowhere_are_refused(tmp_path, point, corner, message):
     points, triangles = SQUARE.copy(), HALVES[0][1].copy()
     points[1], triangles[0, 1] = point, corner
     meshio.Mesh(points, [("triangle", triangles)]).write(tmp_path / "mesh.vtu")
-    with pytest.raises(MeshError, match=message):
+    with pytest.raises(st.MeshError, match=message):
         read_beam_mesh(tmp_path / "mesh.vtu", 1.0, 1.0)
 
 

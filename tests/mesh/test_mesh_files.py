@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import springtune as st
-from springtune.mesh import MeshError, write_mesh
+from springtune.mesh import write_mesh
 from springtune.mesh.formats import read_shape
 
 # Two rows of four cells of 15 x 10 mm, the upper ones halved; the left half is hard.
@@ -294,6 +294,6 @@ def test_what_is_not_read_is_refused_by_its_reason(tmp_path, name):
         content(tmp_path / name)
     else:
         (tmp_path / name).write_text(content)
-    with pytest.raises(MeshError, match=says) as caught:
+    with pytest.raises(st.MeshError, match=says) as caught:
         read_shape(tmp_path / name, 1e-3)
     assert not re.search(r"\(np\.|Error\)|\('", str(caught.value))

@@ -10,23 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import springtune as st
-from springtune.mesh import MESH_TYPES, Mesh, MeshError, quality, signed_areas, write_mesh
+from springtune.mesh import quality, signed_areas, write_mesh
 from springtune.mesh.formats import read_shape
-from springtune.mesh.groups import GroupedMesh
 from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
 from springtune.problem.boundary import check_case
-from springtune.problem.shapes import Hole, LoadCase, Segment, Shape, Support, Traction
 
 
 def plate(**more):
-    holes = [Hole.circle((0.05, 0.02), 0.008), Hole.circle((0.02, 0.02), 0.005, part="core")]
+    holes = [st.Hole.circle((0.05, 0.02), 0.008), st.Hole.circle((0.02, 0.02), 0.005, part="core")]
     points = {"inside": (0.07, 0.012), "tip": (0.1, 0.021), "corner": (0.0, 0.0)}
-    return Shape.rectangle(0.1, 0.04, name="plate", **{"holes": holes, "points": points, **more})
+    return st.Shape.rectangle(0.1, 0.04, name="plate", **{"holes": holes, "points": points, **more})
 
 
 SIDES = [((2, 0), None, "lower"), ((3.25, 0), (0, 0), "outer"), ((0, 2.75), None, "left"), ((0, 1), (0, 0), "inner")]
-LE1 = Shape("le1", 0.1, [Segment(*side) for side in SIDES], points={"D": (2, 0)})
+LE1 = st.Shape("le1", 0.1, [st.Segment(*side) for side in SIDES], points={"D": (2, 0)})
 
 
 def polygon_area(corners):
@@ -61,8 +59,8 @@ def test_any_star_with_a_hole_is_filled(radii, hole, size, power):
     scale = 10.0**power
     angles = [2 * math.pi * (i + 0.3) / len(radii) for i in range(len(radii))]
     corners = [(scale * r * math.cos(angle), scale * r * math.sin(angle)) for r, angle in zip(radii, angles)]
-    sides = [Segment(corner, group=f"side{i}") for i, corner in enumerate(corners)]
-    star = Shape("star", 1e-3, sides, [Hole.circle((0, 0), scale * hole)])
+    sides = [st.Segment(corner, group=f"side{i}") for i, corner in enumerate(corners)]
+    star = st.Shape("star", 1e-3, sides, [st.Hole.circle((0, 0), scale * hole)])
     grouped = mesh_shape(star, scale * size)
     check_sides(star, grouped)
     around = grouped.sides["hole"]
@@ -94,7 +92,7 @@ def test_shapes_have_their_groups_and_points(shape, share):
 
 
 def test_the_area_of_a_mesh_comes_to_that_of_the_shape_by_squares():
-    disc = Shape("disc", 1e-3, Hole.circle((0, 0), 1).outline)
+    disc = st.Shape("disc", 1e-3, st.Hole.circle((0, 0), 1).outline)
     errors = [1 - mesh_shape(disc, math.pi / 2 / n).mesh.area / disc.area for n in (4, 8, 16)]
     assert [math.log2(one / other) for one, other in pairwise(errors)] == pytest.approx([2, 2], abs=0.02)
 
@@ -123,9 +121,9 @@ def test_refinement_is_where_it_is_asked_for():
 
 def test_a_thin_wall_does_not_close():
     """Chords of both arcs keep apart, whatever the size."""
-    outer = Hole.circle((0, 0), 1.0, group="outer").outline
+    outer = st.Hole.circle((0, 0), 1.0, group="outer").outline
     for shift in (0.4, 0.499, 0.49999):
-        ring = Shape("ring", 1e-3, outer, [Hole.circle((shift, 0), 0.5, group="inner")])
+        ring = st.Shape("ring", 1e-3, outer, [st.Hole.circle((shift, 0), 0.5, group="inner")])
         grouped = mesh_shape(ring, 0.6)
         check_sides(ring, grouped)
         assert grouped.mesh.area == pytest.approx(ring.area, rel=0.08)
@@ -134,15 +132,15 @@ def test_a_thin_wall_does_not_close():
 @pytest.mark.parametrize("distance", [1.5e-6, 2.5e-6, 1e-5])
 def test_points_at_the_limit_are_particles_or_refused(distance):
     """What netgen takes for one point is not made one silently."""
-    square = Shape.rectangle(1, 1, points={"a": (0.5, 0.5), "b": (0.5, 0.5 + distance), "c": (0.5, 1 - distance)})
+    square = st.Shape.rectangle(1, 1, points={"a": (0.5, 0.5), "b": (0.5, 0.5 + distance), "c": (0.5, 1 - distance)})
     try:
         check_sides(square, mesh_shape(square, 0.3))
-    except MeshError as error:
+    except st.MeshError as error:
         assert distance < 1e-5 and "too near each other" in str(error)
 
 
 def test_a_shape_far_from_the_origin_is_meshed_alike():
-    far = Shape("far", 1e-3, [Segment((x + 1e4, y - 1e4), group="all") for x, y in [(0, 0), (1, 0), (1, 1), (0, 1)]])
+    far = st.Shape("far", 1e-3, [st.Segment((x, y), group="all") for x, y in UNIT + [1e4, -1e4]])
     assert mesh_shape(far, 0.1).mesh.area == pytest.approx(1, rel=1e-9)
 
 
@@ -169,11 +167,11 @@ def squares():
     mesh = st.make_mesh(st.Beam(0.1, 0.04), "braced", 0.01)
     x, y = mesh.points[mesh.quads].mean(axis=1).T
     halved = mesh.quads[x > 0.07]
-    mixed = Mesh(mesh.points, np.concatenate([halved[:, [0, 1, 2]], halved[:, [0, 2, 3]]]), mesh.quads[x < 0.07])
+    mixed = st.Mesh(mesh.points, np.concatenate([halved[:, [0, 1, 2]], halved[:, [0, 2, 3]]]), mesh.quads[x < 0.07])
     parts = {n: mixed.points[corners].mean(axis=1)[:, 1] < 0.02 for n, corners in mixed.cells.items()}
     outline, _ = outline_of(mixed)
     left = outline[(mixed.points[outline, 0] == 0).all(axis=1)]
-    return GroupedMesh(mixed, {"left": left}, {"between": np.array([0.033, 0.021])}, {"below": parts})
+    return st.GroupedMesh(mixed, {"left": left}, {"between": np.array([0.033, 0.021])}, {"below": parts})
 
 
 def by_meshio(grouped, **sets):
@@ -279,7 +277,7 @@ def test_what_cannot_be_a_group_is_said_when_it_is_used(tmp_path, name):
     make(grouped).write(path)
     found = read_shape(path)
     assert says in found.unusable["cut"]
-    case = LoadCase("pull", [Support("cut", 0, 0)], gravity=(0, -9.81))
+    case = st.LoadCase("pull", [st.Support("cut", 0, 0)], gravity=(0, -9.81))
     with pytest.raises(ValueError, match=r"load 'pull', support: 'cut' .*; (take|mark|put|a cell)") as caught:
         check_case(found, case)
     assert says in str(caught.value)
@@ -298,12 +296,12 @@ def test_names_that_cannot_be_used_are_told(tmp_path):
     ("write", "says"),
     [
         (lambda g: write_mesh("a.vtk", g), "give a name that ends in .vtu"),
-        (lambda g: write_mesh("a.vtu", GroupedMesh(g.mesh, {"part": g.sides["left"]})), "is named 'part', by which"),
+        (lambda g: write_mesh("a.vtu", st.GroupedMesh(g.mesh, {"part": g.sides["left"]})), "is named 'part', by which"),
     ],
 )
 def test_files_that_cannot_hold_a_group_are_not_written(tmp_path, monkeypatch, write, says):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(st.MeshError) as caught:
         write(mesh_shape(plate(), 5e-3))
     assert says in str(caught.value) and not [*tmp_path.iterdir()]
 
@@ -323,16 +321,16 @@ def two_squares(shift, joined=0):
             joined -= 1
     cells = numbers[np.concatenate([halves, halves + 4])]
     used, cells = np.unique(cells, return_inverse=True)
-    return Mesh(points[used], cells.reshape(-1, 3))
+    return st.Mesh(points[used], cells.reshape(-1, 3))
 
 
 def hanging():
     """Squares, one triangle of which is split at the middle of its edge; its neighbour there is not."""
-    mesh = MESH_TYPES["right"](4.0, 4.0, 1.0)
+    mesh = st.MESH_TYPES["right"](4.0, 4.0, 1.0)
     a, b, new = *(int(np.flatnonzero((mesh.points == [x, 1.0]).all(axis=1))[0]) for x in (1.0, 2.0)), len(mesh.points)
     cell = np.flatnonzero(np.isin(mesh.triangles, (a, b)).sum(axis=1) == 2)[0]
     halves = [np.where(mesh.triangles[cell] == end, new, mesh.triangles[cell]) for end in (a, b)]
-    return Mesh(np.vstack([mesh.points, [1.5, 1.0]]), np.vstack([np.delete(mesh.triangles, cell, axis=0), halves]))
+    return st.Mesh(np.vstack([mesh.points, [1.5, 1.0]]), np.vstack([np.delete(mesh.triangles, cell, axis=0), halves]))
 
 
 FAULTS = {
@@ -346,12 +344,12 @@ FAULTS = {
     "hanging inside": (hanging(), "the point at (1500, 1000) mm hangs on the edge"),
     "overlap": (two_squares([0.5, 0.3]), "cells overlap"),
     "inside": (
-        Mesh(np.concatenate([UNIT, 0.3 + 0.2 * UNIT]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),
+        st.Mesh(np.concatenate([UNIT, 0.3 + 0.2 * UNIT]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),
         "cells lie over",
     ),
-    "twice": (Mesh(UNIT, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]), "edges with two cells on the same side"),
+    "twice": (st.Mesh(UNIT, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]), "edges with two cells on the same side"),
     "in a hole": (
-        Mesh(
+        st.Mesh(
             np.concatenate([UNIT, 0.2 + 0.6 * UNIT, 0.4 + 0.2 * UNIT]),
             [*([i, (i + 1) % 4, 4 + i] for i in range(4)), *([(i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)),
              [8, 9, 10], [8, 10, 11]],
@@ -368,7 +366,7 @@ def test_a_mesh_is_a_sheet_or_says_why_not(tmp_path, name):
     assert says in fault and bool(says) == bool(fault)
     write_mesh(tmp_path / "own.vtu", mesh)
     if says:
-        with pytest.raises(MeshError, match=r"own\.vtu: ") as caught:
+        with pytest.raises(st.MeshError, match=r"own\.vtu: ") as caught:
             read_shape(tmp_path / "own.vtu")
         assert says in str(caught.value)
     else:
@@ -383,14 +381,14 @@ def test_a_sheet_without_any_of_its_cells_is_a_sheet_unless_cells_meet_in_a_poin
     kept = np.array(data.draw(some.lists(some.booleans(), min_size=len(mesh.triangles), max_size=len(mesh.triangles))))
     if kept.any():
         used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
-        left = Mesh(mesh.points[used], triangles.reshape(-1, 3))
+        left = st.Mesh(mesh.points[used], triangles.reshape(-1, 3))
         outline, _ = outline_of(left)
         pinched = (np.bincount(outline[:, 0]) > 1).any()
         assert ("point alone" in sheet_fault(left)) == pinched and (pinched or not sheet_fault(left))
 
 
 def pull(*supports, at="right", **more):
-    return LoadCase("pull", supports, [Traction(at, (1, 0))], **more)
+    return st.LoadCase("pull", supports, [st.Traction(at, (1, 0))], **more)
 
 
 def test_each_body_is_to_be_held():
@@ -399,7 +397,7 @@ def test_each_body_is_to_be_held():
     sides = {
         name: outline[(mesh.points[outline, 0] == x).all(axis=1)] for name, x in {"left": 0.0, "right": 4.0}.items()
     }
-    grouped = GroupedMesh(mesh, sides)
+    grouped = st.GroupedMesh(mesh, sides)
     with pytest.raises(ValueError, match=r"one of the 2 bodies that are not joined, at \(3500, 500\) mm, free to move"):
-        check_case(grouped, pull(Support("left", 0, 0)))
-    check_case(grouped, pull(Support("left", 0, 0), Support("right", 0, 0)))
+        check_case(grouped, pull(st.Support("left", 0, 0)))
+    check_case(grouped, pull(st.Support("left", 0, 0), st.Support("right", 0, 0)))

@@ -9,14 +9,8 @@ import pytest
 import springtune as st
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES
-from springtune.prediction.choices import USUAL_LOADS, predict, predicted, references
+from springtune.prediction.choices import USUAL_LOADS, predicted, references
 from springtune.problem.boundary import held, weights
-from springtune.problem.geometry import Beam
-from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
-from springtune.springs import DEFINITIONS, DefinitionError
 
 from problems import pulled
 
@@ -26,12 +20,12 @@ pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.Ass
 
 def springs_of(choice, mesh, beam, material):
     """Springs that a row of a prediction stands for."""
-    return DEFINITIONS[choice.definition].springs(mesh, material, beam.thickness)
+    return st.DEFINITIONS[choice.definition].springs(mesh, material, beam.thickness)
 
 
 def solved(mesh, beam, springs, load):
     """Displacement of a load of 1 N [m] by dense matrices; None where the network is not positive definite."""
-    kind = LOADS[load].kind
+    kind = st.LOADS[load].kind
     network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
     pattern = weights(mesh, kind)
     tangent = network.tangent().toarray()
@@ -47,25 +41,27 @@ def random_beam(random):
     """Beam, material, mesh type and mesh: aspects of .5 to 20, one to fourteen cells across, every nu."""
     height = np.exp(random.uniform(np.log(5e-3), np.log(0.1)))
     length = height * np.exp(random.uniform(np.log(0.5), np.log(20)))
-    beam = Beam(length, height, random.uniform(1e-4, 1e-2), "any")
-    material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5), name="any")
+    beam = st.Beam(length, height, random.uniform(1e-4, 1e-2), "any")
+    material = st.Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5), name="any")
     if random.random() < 0.3:
-        material = Material(material.young_modulus, float(random.choice([0.0, 1 / 3, 0.5])), name="any")
-    mesh_type = str(random.choice(list(MESH_TYPES)))
+        material = st.Material(material.young_modulus, float(random.choice([0.0, 1 / 3, 0.5])), name="any")
+    mesh_type = str(random.choice(list(st.MESH_TYPES)))
     size = min(length, height) / np.exp(random.uniform(0, np.log(14)))
-    while MESH_TYPES[mesh_type].particles(length, height, size) > 300:  # dense matrices are of twice as many unknowns
+    while (
+        st.MESH_TYPES[mesh_type].particles(length, height, size) > 300
+    ):  # dense matrices are of twice as many unknowns
         size *= 1.2
-    return beam, material, mesh_type, MESH_TYPES[mesh_type](length, height, min(size, length, height))
+    return beam, material, mesh_type, st.MESH_TYPES[mesh_type](length, height, min(size, length, height))
 
 
 def check(beam, material, mesh):
     """Every number of a prediction, and its order, against dense solutions."""
     known = references(beam, material)
-    choices = predict(beam, mesh, material, known)
+    choices = st.predict(beam, mesh, material, known)
     worst = []
     for choice in choices:
         if "springs" in choice.failures:
-            with pytest.raises(DefinitionError):
+            with pytest.raises(st.DefinitionError):
                 springs_of(choice, mesh, beam, material)
             worst.append(np.inf)
             continue
@@ -95,9 +91,9 @@ def check(beam, material, mesh):
 
 class TestWhatClosedFormsGotWrong:
     def choices(self, mesh_type, nu, length=0.1, height=0.02, size=5e-3, also=()):
-        beam, material = Beam(length, height, 1e-3, "b"), Material(1e9, nu, name="m")
-        mesh = MESH_TYPES[mesh_type](length, height, size)
-        found = {choice.definition: choice for choice in predict(beam, mesh, material, also=also)}
+        beam, material = st.Beam(length, height, 1e-3, "b"), st.Material(1e9, nu, name="m")
+        mesh = st.MESH_TYPES[mesh_type](length, height, size)
+        found = {choice.definition: choice for choice in st.predict(beam, mesh, material, also=also)}
         # Errors that differ by less than the references' estimates are equal: names are their order.
         errors = [choice.worst for choice in found.values()]
         assert all(before <= after + 1e-6 for before, after in itertools.pairwise(errors))
@@ -127,25 +123,25 @@ class TestWhatClosedFormsGotWrong:
         assert set(list(found)[-2:]) == {"area", "patch-area"} and found["area"].worst == np.inf
 
     def test_no_reference_no_number(self):
-        beam, material = Beam(0.1, 0.02, 1e-3, "b"), Material(1e9, 0.3, name="m")
+        beam, material = st.Beam(0.1, 0.02, 1e-3, "b"), st.Material(1e9, 0.3, name="m")
         known = references(beam, material) | {"bending": "it did not converge"}
-        mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-        choices = predict(beam, mesh, material, known)
+        mesh = st.MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        choices = st.predict(beam, mesh, material, known)
         for choice in choices:
             assert np.isnan(choice.errors["bending"]) and not choice.failures
             assert choice.worst == max(abs(choice.errors["traction"]), abs(choice.errors["shear"]))
-        nothing = predict(beam, mesh, material, dict.fromkeys(USUAL_LOADS, "none"))
+        nothing = st.predict(beam, mesh, material, dict.fromkeys(USUAL_LOADS, "none"))
         assert all(choice.worst == np.inf for choice in nothing)
 
     def test_cells_that_no_definition_takes_are_refused(self):
         """Squares beside triangles: springs fitted to elements take them; one that is asked for says why not."""
-        mesh = MESH_TYPES["braced"](0.1, 0.02, 5e-3)
+        mesh = st.MESH_TYPES["braced"](0.1, 0.02, 5e-3)
         half = mesh.points[mesh.quads].mean(axis=1)[:, 0] < 0.05
         triangles = np.vstack([mesh.quads[half][:, [0, 1, 2]], mesh.quads[half][:, [0, 2, 3]]])
-        beam, material = Beam(0.1, 0.02, 1e-3, "b"), Material(1e9, 0.3, name="m")
+        beam, material = st.Beam(0.1, 0.02, 1e-3, "b"), st.Material(1e9, 0.3, name="m")
         mixed = type(mesh)(mesh.points, triangles, mesh.quads[~half])
-        assert "element-fit" in predict(beam, mixed, material)[0].tried
-        *solved, refused = predict(beam, mixed, material, also=["baudet"])
+        assert "element-fit" in st.predict(beam, mixed, material)[0].tried
+        *solved, refused = st.predict(beam, mixed, material, also=["baudet"])
         assert "needs rectangles" in refused.failures["springs"] and not any(one.failures for one in solved)
         assert "baudet" not in refused.tried
 
@@ -156,17 +152,17 @@ def test_every_number_is_solved_and_the_first_is_the_best(seed, beams):
     assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(beams)) > 4 * beams
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_particles_are_counted_before_the_mesh_is_made(mesh_type):
     for length, height, size in ((0.2, 0.04, 2e-3), (0.1, 0.1, 4e-3), (0.3, 0.02, 1e-3)):
-        made = len(MESH_TYPES[mesh_type](length, height, size).points)
-        assert MESH_TYPES[mesh_type].particles(length, height, size) == pytest.approx(made, rel=0.2)
+        made = len(st.MESH_TYPES[mesh_type](length, height, size).points)
+        assert st.MESH_TYPES[mesh_type].particles(length, height, size) == pytest.approx(made, rel=0.2)
 
 
 def random_case(random, most=2000):
     """Beam of 1 mm to 1 m, aspect .3 to 12; material; mesh type; size: one cell across to so many particles."""
     aspect = np.exp(random.uniform(np.log(0.3), np.log(12)))
-    material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5), name="any")
+    material = st.Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5), name="any")
     return aspect, material, *random_mesh(random, aspect, most)
 
 
@@ -176,8 +172,8 @@ def random_mesh(random, aspect, most):
     length = aspect * height
     if length > 1:
         length, height = 1.0, 1 / aspect
-    beam = Beam(length, height, np.exp(random.uniform(np.log(1e-4), np.log(1e-2))), "any")
-    mesh_type, particles = str(random.choice(list(MESH_TYPES))), np.exp(random.uniform(np.log(4), np.log(most)))
+    beam = st.Beam(length, height, np.exp(random.uniform(np.log(1e-4), np.log(1e-2))), "any")
+    mesh_type, particles = str(random.choice(list(st.MESH_TYPES))), np.exp(random.uniform(np.log(4), np.log(most)))
     return beam, mesh_type, min(length, height, np.sqrt(length * height / particles))
 
 
@@ -191,7 +187,7 @@ def compared(beam, mesh, material, choices, loads):
             options = {"definition": choice.definition, "kinematics": "linear", "sheet": sheet}
             scene = st.Scene(beam, mesh, material, load, 1.0, **options)
             sheet, result, said = scene.sheet, scene.solve(), choice.errors[load]
-            if result.status is not Status.SOLVED:
+            if result.status is not st.Status.SOLVED:
                 assert np.isnan(said) and choice.failures
                 continue
             assert said == pytest.approx(result.error, abs=2e-3, rel=0.1)
@@ -203,13 +199,13 @@ def compared(beam, mesh, material, choices, loads):
 class TestWhatScenesSay:
     """A prediction states no number that a scene of the same definition contradicts."""
 
-    @pytest.mark.parametrize("mesh_type", MESH_TYPES)
+    @pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
     @pytest.mark.parametrize("height", ["8 mm", "40 mm"])
     def test_of_every_definition_and_load(self, mesh_type, height):
         """Bending of one row of cells is too stiff by much, but never by all of it."""
         beam, material = st.Beam("200 mm", height), st.Material("210 GPa", 0.3)
         mesh = st.make_mesh(beam, mesh_type, "8 mm")
-        choices = predict(beam, mesh, material, loads=predicted())
+        choices = st.predict(beam, mesh, material, loads=predicted())
         assert compared(beam, mesh, material, choices, predicted()) >= 3 * len(predicted())
         assert all(one.failures or one.errors["bending"] > -1 for one in choices)
 
@@ -219,13 +215,13 @@ class TestWhatScenesSay:
         for number in range(4):
             aspect, material, *_ = random_case(random)
             load = predicted()[number % len(predicted())]
-            one = references(Beam(aspect, 1.0, 1.0), Material(1.0, material.poisson_ratio), [load])[load]
+            one = references(st.Beam(aspect, 1.0, 1.0), st.Material(1.0, material.poisson_ratio), [load])[load]
             for largest in (1000, *4 * (200,)):
                 beam, mesh_type, size = random_mesh(random, aspect, largest)
-                material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), material.poisson_ratio)
-                mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+                material = st.Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), material.poisson_ratio)
+                mesh = st.MESH_TYPES[mesh_type](beam.length, beam.height, size)
                 known = {load: one._replace(value=one.value / (material.young_modulus * beam.thickness))}
-                choices = predict(beam, mesh, material, known, loads=[load])
+                choices = st.predict(beam, mesh, material, known, loads=[load])
                 count += compared(beam, mesh, material, [choices[random.integers(len(choices))]], [load])
         assert count > 16  # some are unstable
 
@@ -233,9 +229,9 @@ class TestWhatScenesSay:
 class TestLoads:
     def test_a_load_and_its_opposite_are_one(self):
         """In small strain."""
-        beam, material = Beam(0.1, 0.02), Material(1e9, 0.3)
-        mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
-        choices = predict(beam, mesh, material, loads=["compression", "traction"])
+        beam, material = st.Beam(0.1, 0.02), st.Material(1e9, 0.3)
+        mesh = st.MESH_TYPES["free"](0.1, 0.02, 5e-3)
+        choices = st.predict(beam, mesh, material, loads=["compression", "traction"])
         assert [list(choice.errors) for choice in choices] == [["compression", "traction"]] * len(choices)
         assert all(choice.errors["compression"] == -choice.errors["traction"] for choice in choices)
 
@@ -260,9 +256,9 @@ def seeded(seed):
         hole = st.Hole.circle((length / 2, height / 2), height / 6)
         shape = st.Shape.rectangle(length, height, holes=[hole], loads={"pull": pulled("10 N", "5 N", components="xy")})
         return shape, st.mesh_shape(shape, size), material, {"load": "pull"}
-    beam, mesh_type = Beam(length, height, 1e-3), list(MESH_TYPES)[seed % len(MESH_TYPES)]
+    beam, mesh_type = st.Beam(length, height, 1e-3), list(st.MESH_TYPES)[seed % len(st.MESH_TYPES)]
     loads = [str(one) for one in random.choice(predicted(), random.integers(1, 4), replace=False)]
-    return beam, MESH_TYPES[mesh_type](length, height, size), material, {"loads": loads}
+    return beam, st.MESH_TYPES[mesh_type](length, height, size), material, {"loads": loads}
 
 
 def worst_by_scenes(body, mesh, material, about, name):
@@ -273,12 +269,12 @@ def worst_by_scenes(body, mesh, material, about, name):
         try:
             scene = st.Scene(body, mesh, material, load, *force, **options, sheet=sheet)
             result, sheet, energies = scene.solve(), scene.sheet, bool(scene.springs.energies)
-        except DefinitionError:
+        except st.DefinitionError:
             return None
         except SingularError:
             return False, np.inf
         errors = result.errors.values() if "load" in about else [result.error]
-        worst += [abs(one) if result.status is Status.SOLVED else np.inf for one in errors]
+        worst += [abs(one) if result.status is st.Status.SOLVED else np.inf for one in errors]
     return energies, np.nanmax(worst)
 
 
@@ -289,9 +285,9 @@ class TestAllDefinitionsCount:
     def test_nothing_left_out_is_better(self, seed):
         """Of all definitions that are no search and are given nothing, by scenes."""
         body, mesh, material, about = seeded(seed)
-        choices = predict(body, mesh, material, **about)
-        given = [name for name, one in DEFINITIONS.items() if one.needs or one.uniaxial or one.cost > 1]
-        found = {name: worst_by_scenes(body, mesh, material, about, name) for name in {*DEFINITIONS} - {*given}}
+        choices = st.predict(body, mesh, material, **about)
+        given = [name for name, one in st.DEFINITIONS.items() if one.needs or one.uniaxial or one.cost > 1]
+        found = {name: worst_by_scenes(body, mesh, material, about, name) for name in {*st.DEFINITIONS} - {*given}}
         solved = {name: one for name, one in found.items() if one is not None}
         assert {*choices[0].tried} == {*solved}
         for springs_alone in (False, True):
@@ -302,8 +298,8 @@ class TestAllDefinitionsCount:
 
     def test_those_of_others_count(self):
         """A definition from outside can be the best one; a faulty one of another package is left out."""
-        beam, material = Beam(0.1, 0.02), Material(1e9, 0.3)
-        mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
+        beam, material = st.Beam(0.1, 0.02), st.Material(1e9, 0.3)
+        mesh = st.MESH_TYPES["free"](0.1, 0.02, 5e-3)
         best = st.best_springs(mesh, material, 1e-3, starts=["van-gelder"], evaluations=100).springs
 
         @st.definition("theirs")
@@ -316,14 +312,14 @@ class TestAllDefinitionsCount:
 
         try:
             with pytest.raises(ZeroDivisionError):
-                predict(beam, mesh, material)
-            DEFINITIONS.packages["faulty"] = "other"
-            choices = predict(beam, mesh, material)
+                st.predict(beam, mesh, material)
+            st.DEFINITIONS.packages["faulty"] = "other"
+            choices = st.predict(beam, mesh, material)
             assert choices[0].definition == "theirs" and "faulty" not in choices[0].tried
         finally:
-            DEFINITIONS.packages.pop("faulty", None)
+            st.DEFINITIONS.packages.pop("faulty", None)
             for name in ("theirs", "faulty"):
-                DEFINITIONS.discard(name)
+                st.DEFINITIONS.discard(name)
 
     @pytest.mark.parametrize("engine", ["xpbd", "implicit-cg"])
     def test_what_an_engine_takes(self, engine):
@@ -335,7 +331,7 @@ class TestAllDefinitionsCount:
         beam, rubber = st.Beam("60 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
         make = partial(st.Scene, beam, st.make_mesh(beam, "free", "5 mm"), rubber, "traction", "0.2 N")
         chosen, setting, worst = ENGINES[engine], Setting(), {}
-        for choice in predict(*make.args[:3], also=predict(*make.args[:3])[0].tried):
+        for choice in st.predict(*make.args[:3], also=st.predict(*make.args[:3])[0].tried):
             try:
                 chosen.start(net_of(make(definition=choice.definition)), setting, 1.0)
                 worst[choice.definition] = choice

@@ -6,8 +6,7 @@ import pytest
 import springtune as st
 from counting import counted
 from springtune.prediction.choices import in_order, predicted
-from springtune.prediction.search import FINER_SIZES, asked_error, find_mesh
-from springtune.problem.status import Status
+from springtune.prediction.search import FINER_SIZES, asked_error
 from springtune.scene.mesh_cache import MeshCache
 
 from problems import pulled
@@ -22,7 +21,7 @@ def worst(beam, material, one, size, loads):
         options = {"definition": one.choice.definition, "kinematics": "linear", "sheet": sheet}
         scene = st.Scene(beam, mesh, material, load, 1.0, **options)
         result, sheet = scene.solve(), scene.sheet
-        errors.append(abs(result.error) if result.status is Status.SOLVED else np.inf)
+        errors.append(abs(result.error) if result.status is st.Status.SOLVED else np.inf)
     return max(errors)
 
 
@@ -31,7 +30,7 @@ TYPES = ("structured", "right", "braced")
 
 @pytest.fixture(scope="module")
 def search():
-    return find_mesh(BEAM, STEEL, "5 %", loads=["traction", "bending"], mesh_types=TYPES)
+    return st.find_mesh(BEAM, STEEL, "5 %", loads=["traction", "bending"], mesh_types=TYPES)
 
 
 def found_in(search):
@@ -91,12 +90,12 @@ class TestWhatIsFound:
     @pytest.mark.parametrize(("length", "height"), [(0.05, 0.04), (0.012, 0.04), (0.4, 0.04)])
     def test_cells_across_are_those_of_the_smaller_side(self, length, height):
         beam = st.Beam(length, height)
-        for one in found_in(find_mesh(beam, STEEL, "10 %", loads=["traction"], mesh_types=["right", "braced"])):
+        for one in found_in(st.find_mesh(beam, STEEL, "10 %", loads=["traction"], mesh_types=["right", "braced"])):
             points = st.make_mesh(beam, one.mesh_type, one.size).points
             assert len(np.unique(points[:, int(height <= length)])) - 1 == one.cells
 
     def test_the_same_search_has_the_same_answer(self, search):
-        again = find_mesh(BEAM, STEEL, 0.05, loads=["traction", "bending"], mesh_types=["braced", "structured"])
+        again = st.find_mesh(BEAM, STEEL, 0.05, loads=["traction", "bending"], mesh_types=["braced", "structured"])
         for name in ("structured", "braced"):
             assert again.by_type[name].choice == search.by_type[name].choice
             assert again.by_type[name].size == search.by_type[name].size
@@ -111,7 +110,7 @@ class TestRandomSearches:
         beam, material = st.Beam(aspect, 1.0), st.Material(1e9, nu)
         loads = ["traction", "bending", "shear"][: random.integers(1, 4)]
         error, mesh_type = random.choice([0.02, 0.05, 0.1]), str(random.choice(list(st.MESH_TYPES)))
-        search = find_mesh(beam, material, float(error), loads=loads, mesh_types=[mesh_type], most=most)
+        search = st.find_mesh(beam, material, float(error), loads=loads, mesh_types=[mesh_type], most=most)
         for one in found_in(search):
             assert worst(beam, material, one, one.size, loads) <= error
             cells = random.integers(one.cells + 1, 2 * one.cells + 1)
@@ -143,7 +142,7 @@ class TestBetweenWholeDivisions:
     def test_finer_sizes_keep_the_error(self, question):
         beam, nu, error, loads, mesh_type = QUESTIONS[question]
         material = st.Material("210 GPa", nu)
-        search = find_mesh(beam, material, error, loads=loads, mesh_types=[mesh_type], most=2000)
+        search = st.find_mesh(beam, material, error, loads=loads, mesh_types=[mesh_type], most=2000)
         assert search.best
         for one in found_in(search):
             # Those that are promised, and twelve others.
@@ -159,7 +158,7 @@ class TestBetweenWholeDivisions:
             beam, material = st.Beam(0.1 * aspect, 0.1), st.Material("210 GPa", nu)
             loads = [str(name) for name in random.permutation(predicted())[: random.integers(1, 4)]]
             error, types = float(random.choice([0.005, 0.01, 0.02, 0.05])), list(random.permutation([*st.MESH_TYPES]))
-            search = find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
+            search = st.find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
             for one in found_in(search):
                 sizes = one.size * random.uniform(0.5, 1, 12)
                 broken.append(max(worst(beam, material, one, size, loads) for size in sizes) > error)
@@ -175,7 +174,7 @@ class TestBetweenWholeDivisions:
 
     def test_shapes_are_tried_there_too(self):
         plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pulled("4 kN", 0)})
-        search = find_mesh(plate, STEEL, "2 %")
+        search = st.find_mesh(plate, STEEL, "2 %")
         one, known = search.best, search.known["end"].value
         assert any(finer.cells != int(finer.cells) for finer in one.finer)
         for part in FINER_SIZES[::2]:
@@ -189,7 +188,7 @@ class TestTies:
 
     def test_exact_ones_are_in_a_fixed_order(self):
         """Under traction at nu = 0 several definitions are exact; springs alone come first, then names."""
-        search = find_mesh(st.Beam("800 mm", "100 mm"), st.Material("1 GPa", 0.0), "1 %", loads=["traction"],
+        search = st.find_mesh(st.Beam("800 mm", "100 mm"), st.Material("1 GPa", 0.0), "1 %", loads=["traction"],
                            mesh_types=["alternating", "right"])  # fmt: skip
         assert search.best.mesh_type == "alternating" and search.best.choice.definition == "patch"
         assert search.best.choice.worst < 1e-9
@@ -201,29 +200,29 @@ class TestTies:
 
 class TestWhatIsNotFound:
     def test_none_within_so_many_particles(self):
-        search = find_mesh(BEAM, STEEL, "1 %", mesh_types=["right"], most=300)
+        search = st.find_mesh(BEAM, STEEL, "1 %", mesh_types=["right"], most=300)
         assert search.best is None and search.best_springs is None and search.by_type == {"right": None}
         assert max(one.particles for one in search.tried) <= 300
 
     def test_none_if_not_even_one_cell_is_allowed(self):
-        search = find_mesh(BEAM, STEEL, "1 %", mesh_types=["right"], most=5)
+        search = st.find_mesh(BEAM, STEEL, "1 %", mesh_types=["right"], most=5)
         assert search.best is None and search.tried == ()
 
     def test_too_few_finer_ones_are_said(self):
         """Nine cells across are 460 particles; eighteen would be 1,700."""
-        search = find_mesh(BEAM, STEEL, "5 %", mesh_types=["right"], most=700)
+        search = st.find_mesh(BEAM, STEEL, "5 %", mesh_types=["right"], most=700)
         assert search.best is None and min(one.worst(name) for one in search.tried for name in one.errors) <= 0.05
 
     def test_what_tends_to_another_error_is_given_up(self):
         """Squares with one diagonal and springs alone have nu = 0, whatever their size: some 11 % off in shear."""
-        search = find_mesh(BEAM, STEEL, "5 %", loads=["traction", "shear"], mesh_types=["right"])
+        search = st.find_mesh(BEAM, STEEL, "5 %", loads=["traction", "shear"], mesh_types=["right"])
         assert search.best is not None and search.best_springs is None
         patch = [one for one in search.tried if "patch" in one.errors]
         assert patch[-1].particles < 1000 and patch[-1].worst("patch") > 0.1
 
     def test_networks_that_are_unstable_are_no_answer(self):
         """A sheet that grows wider as it is pulled."""
-        search = find_mesh(BEAM, st.Material(1e9, -0.6), "2 %", mesh_types=["structured"], most=1500)
+        search = st.find_mesh(BEAM, st.Material(1e9, -0.6), "2 %", mesh_types=["structured"], most=1500)
         assert search.tried[0].worst("area") == np.inf and "area" not in search.tried[-1].errors
         assert search.best is None or not search.best.choice.failures
 
@@ -238,5 +237,5 @@ class TestArguments:
             counted(MeshCache.__init__) as calls,
             pytest.raises(ValueError, match=r"^error: '1e-05 %' is below the error estimate of the .*; give at least "),
         ):
-            find_mesh(BEAM, STEEL, "1e-05 %")
+            st.find_mesh(BEAM, STEEL, "1e-05 %")
         assert not calls  # nothing is solved but the references

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
+import springtune as st
 from springtune.problem.compare import best_stiffness, deformation_error, sign_sentence, sign_word
-from springtune.problem.status import Status
 from springtune.springs.calibrated import calibrate
 
 
@@ -41,24 +41,24 @@ def found(curve, reference, first_stable=0.0):
 
 
 @example(best=1.5, bend=0.03, sign=-1.0)  # the root falls on a sample
-@given(best=st.floats(0.5, 1.5), bend=st.floats(-0.3, 0.3), sign=st.sampled_from([-1.0, 1.0]))
+@given(best=some.floats(0.5, 1.5), bend=some.floats(-0.3, 0.3), sign=some.sampled_from([-1.0, 1.0]))
 def test_best_stiffness_of_a_known_curve(best, bend, sign):
     """U = 1/k + bend/k^2 meets its own value at k = best."""
     if bend < 0 and -2 * bend / best > 0.9:
         return  # the curve turns back and meets the value twice
     met = found(lambda k: sign * (1 / k + bend / k**2), sign * (1 / best + bend / best**2))
-    assert (met.status, met.message) == (Status.SOLVED, "")
+    assert (met.status, met.message) == (st.Status.SOLVED, "")
     assert met.stiffness == pytest.approx(best, rel=1e-9)
 
 
 @example(place=0.713, first_stable=0.7)  # between two samples of which one is stable
 @example(place=0.707, first_stable=0.711)
-@given(place=st.floats(0.45, 1.55), first_stable=st.floats(0.42, 1.5))
+@given(place=some.floats(0.45, 1.55), first_stable=some.floats(0.42, 1.5))
 def test_best_stiffness_is_of_a_stable_point(place, first_stable):
     met = found(lambda k: 1 / k, 1 / place, first_stable)
     if abs(place / first_stable - 1) < 1e-4:
         return  # the search ends before the very end of the stable part
-    assert met.status == (Status.SOLVED if place > first_stable else Status.UNSTABLE)
+    assert met.status == (st.Status.SOLVED if place > first_stable else st.Status.UNSTABLE)
     assert met.stiffness == pytest.approx(place if place > first_stable else np.nan, rel=1e-9, nan_ok=True)
 
 
@@ -73,17 +73,17 @@ def test_best_stiffness_in_a_gap_is_solved_for_or_missing_with_a_reason():
     displacement[STIFFNESS < 0.6] = 1 / STIFFNESS[STIFFNESS < 0.6]
     stable = STIFFNESS >= 0.781
     met = best_stiffness(STIFFNESS, displacement, stable, solve(0.777), solve)
-    assert met.status == Status.SOLVED and met.stiffness == pytest.approx(0.777, rel=1e-9)
+    assert met.status == st.Status.SOLVED and met.stiffness == pytest.approx(0.777, rel=1e-9)
     nothing = best_stiffness(STIFFNESS, displacement, stable, solve(0.777), lambda stiffness: np.nan)
-    assert np.isnan(nothing.stiffness) and nothing.status == Status.NOT_CONVERGED and "gap" in nothing.message
+    assert np.isnan(nothing.stiffness) and nothing.status == st.Status.NOT_CONVERGED and "gap" in nothing.message
 
 
 def test_best_stiffness_is_nan_where_there_is_none():
     for reference in (100.0, np.nan):
         met = found(lambda k: 1 / k, reference)
-        assert np.isnan(met.stiffness) and met.status == Status.FAILED and met.message
+        assert np.isnan(met.stiffness) and met.status == st.Status.FAILED and met.message
     empty = best_stiffness(STIFFNESS, np.full(61, np.nan), np.zeros(61, dtype=bool), 1.0, lambda k: np.nan)
-    assert np.isnan(empty.stiffness) and empty.status == Status.NOT_CONVERGED
+    assert np.isnan(empty.stiffness) and empty.status == st.Status.NOT_CONVERGED
 
 
 def test_holes_of_a_curve_do_not_spoil_its_best_stiffness():

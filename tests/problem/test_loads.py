@@ -2,24 +2,9 @@
 
 import pytest
 
-from springtune.mesh import MESH_TYPES
+import springtune as st
 from springtune.problem import loads
-from springtune.problem.geometry import Beam
-from springtune.problem.loads import (
-    AXIAL,
-    BENDING,
-    BOTH,
-    BOTTOM,
-    FACE,
-    LEFT,
-    LOAD_KINDS,
-    LOADS,
-    OWN_LOADS,
-    RIGHT,
-    SHEAR,
-    TOP,
-)
-from springtune.problem.materials import Material
+from springtune.problem.loads import AXIAL, BENDING, BOTH, BOTTOM, FACE, LEFT, LOAD_KINDS, OWN_LOADS, RIGHT, SHEAR, TOP
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
@@ -31,8 +16,8 @@ from tables import STUDIES
 LIFT = loads.LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
 BUILT_IN = loads.LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
 
-BEAM, FORCE = Beam(0.1, 0.02, 1e-3, "100x20"), 50.0
-CORK = Material(1e9, 0.0, name="cork")
+BEAM, FORCE = st.Beam(0.1, 0.02, 1e-3, "100x20"), 50.0
+CORK = st.Material(1e9, 0.0, name="cork")
 EXACT = FORCE * BEAM.height / (CORK.young_modulus * BEAM.thickness * BEAM.length)
 """Displacement of the top under an even traction without lateral contraction: strain is the same everywhere."""
 
@@ -46,7 +31,7 @@ def lift(monkeypatch):
 
 def network_displacement(beam, material, force, kind, definition, size, mesh_type="structured"):
     """Displacement of a load on a linear network [m]."""
-    mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+    mesh = st.MESH_TYPES[mesh_type](beam.length, beam.height, size)
     sheet = MeshCache(mesh, beam.thickness)
     springs, _ = sheet.derive(definition, material)
     return sheet.solve(kind, springs, force, "linear").displacement
@@ -72,12 +57,12 @@ def test_half_models_hold_what_symmetry_asks_for():
 
 @pytest.mark.parametrize("mesh_type", ["structured", "right", "free"])
 def test_a_new_kind_on_a_network(lift, mesh_type):
-    found = network_displacement(BEAM, CORK, FORCE, LOADS["lift"].kind, "delingette", 2e-3, mesh_type)
+    found = network_displacement(BEAM, CORK, FORCE, st.LOADS["lift"].kind, "delingette", 2e-3, mesh_type)
     assert found == pytest.approx(EXACT, rel=1e-6)
 
 
 def test_a_new_kind_in_the_references(lift):
-    kind = LOADS["lift"].kind
+    kind = st.LOADS["lift"].kind
     small = solve_small_strain(BEAM, CORK, FORCE, kind=kind)
     assert small.displacement == pytest.approx(EXACT, rel=1e-6)
     assert small.displacement == pytest.approx(small.mean_displacement, rel=1e-9)
@@ -99,8 +84,8 @@ def test_a_new_kind_through_a_study(lift, tmp_path):
 
 
 def test_a_plate_clamped_at_both_ends():
-    slender, nu = Beam(0.4, 0.01, 1e-3, "slender"), 0.0
-    wood = Material(1e9, nu, name="wood")
+    slender, nu = st.Beam(0.4, 0.01, 1e-3, "slender"), 0.0
+    wood = st.Material(1e9, nu, name="wood")
     bending = FORCE * slender.length**3 / (384 * wood.young_modulus * slender.thickness * slender.height**3 / 12)
     # Shear stress of a parabola: 6/5 of the mean strain counts; the middle sinks by F L / 8 of it.
     shear = 1.2 * FORCE * slender.length / (8 * wood.young_modulus / 2 * slender.thickness * slender.height)
@@ -109,7 +94,7 @@ def test_a_plate_clamped_at_both_ends():
     assert small.mean_displacement / small.displacement == pytest.approx(8 / 15, rel=1e-2)
 
 
-@pytest.mark.parametrize("material", [CORK, Material(1e6, 0.45, name="rubber")], ids=lambda one: one.name)
+@pytest.mark.parametrize("material", [CORK, st.Material(1e6, 0.45, name="rubber")], ids=lambda one: one.name)
 def test_supports_of_a_new_kind_are_the_same_everywhere(material):
     force = -1e-7 * material.young_modulus * BEAM.thickness * BEAM.length
     small = solve_small_strain(BEAM, material, force, kind=BUILT_IN)
@@ -126,7 +111,7 @@ def test_a_kind_whose_supports_are_not_symmetric_has_no_half_model():
     with pytest.raises(ValueError, match="not symmetric"):
         solve_small_strain(BEAM, CORK, FORCE, kind=one_sided)
     # The whole is solved at finite strain: a cantilever under an even load, F L^3 / (8 E I) at its end.
-    beam, force = Beam(0.2, 0.01, 1e-3, "slender"), 1e-4
+    beam, force = st.Beam(0.2, 0.01, 1e-3, "slender"), 1e-4
     found = solve_finite_strain(beam, CORK, force, kind=one_sided)
     end = force * beam.length**3 / (8 * CORK.young_modulus * beam.thickness * beam.height**3 / 12)
     assert found.profile[-1] == pytest.approx(end, rel=5e-3)

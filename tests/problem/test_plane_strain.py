@@ -8,7 +8,6 @@ import springtune as st
 from springtune.mechanics.network import Network
 from springtune.prediction.choices import references
 from springtune.problem.loads import AXIAL
-from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support
 from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
@@ -99,14 +98,14 @@ def test_a_ring_under_pressure_widens_as_lame_says():
     inner, outer, pressure = 0.01, 0.03, 1e6
     corners = [(inner, 0.0), (outer, 0.0), (0.0, outer), (0.0, inner)]
     centres, names = (None, (0.0, 0.0)) * 2, ("lower", "outer", "left", "bore")
-    sides = [Segment(at, centre=centre, group=name) for at, centre, name in zip(corners, centres, names)]
-    burst = LoadCase(
+    sides = [st.Segment(at, centre=centre, group=name) for at, centre, name in zip(corners, centres, names)]
+    burst = st.LoadCase(
         "burst",
-        (Support("lower", y=0.0), Support("left", x=0.0)),
-        pressures=(Pressure("bore", pressure),),
-        quantities=(Quantity("bore", "displacement", "bore", "x"),),
+        (st.Support("lower", y=0.0), st.Support("left", x=0.0)),
+        pressures=(st.Pressure("bore", pressure),),
+        quantities=(st.Quantity("bore", "displacement", "bore", "x"),),
     )
-    found = solve_shape(Shape("pipe", 1e-3, sides, loads={"burst": burst}), burst, {"": STEEL}).values["bore"]
+    found = solve_shape(st.Shape("pipe", 1e-3, sides, loads={"burst": burst}), burst, {"": STEEL}).values["bore"]
     young, nu, square = 210e9, 0.3, inner**2 / (outer**2 - inner**2)
     widened = (1 + nu) / young * pressure * square * ((1 - 2 * nu) * inner + outer**2 / inner)
     assert found == pytest.approx(2 / np.pi * widened, rel=1e-6)
@@ -146,8 +145,8 @@ def test_a_shape_at_finite_strain_is_in_the_plane_of_its_material():
         even = shear * volume ** (-2 / 3) * (stretches - total / (3 * stretches))
         return even + bulk * (volume - 1) * stretches[::-1] - [force / (height * 1e-3), 0]
 
-    case = pulled(force, 0.0, supports=(Support("left", x=0.0), Support("lower", y=0.0)))
-    shape = Shape.rectangle(length, height, loads={"pull": case})
+    case = pulled(force, 0.0, supports=(st.Support("left", x=0.0), st.Support("lower", y=0.0)))
+    shape = st.Shape.rectangle(length, height, loads={"pull": case})
     found = solve_finite_shape(shape, case, {"": rubber}).values["end"]
     assert found == pytest.approx((root(stresses, [1.3, 0.8], tol=1e-12).x[0] - 1) * length, rel=1e-9)
     sheet = solve_finite_shape(shape, case, {"": rubber}, law="st-venant").values["end"]

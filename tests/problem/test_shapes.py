@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
+import springtune as st
 from springtune.mesh.sides import OutlineSide
-from springtune.problem.shapes import Hole, Segment, Shape
 
 ORIGIN = (0.0, 0.0)
 
@@ -15,7 +15,7 @@ ORIGIN = (0.0, 0.0)
 def outline(*corners, centres=(), group=""):
     """Segments of corners, some of them arcs about centres."""
     centres = dict(enumerate(centres))
-    return [Segment(corner, centres.get(i), group) for i, corner in enumerate(corners)]
+    return [st.Segment(corner, centres.get(i), group) for i, corner in enumerate(corners)]
 
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
@@ -57,16 +57,18 @@ def test_the_nearest_point_of_a_circle_is_on_its_radius():
 
 def test_areas_are_those_of_closed_forms():
     le1 = outline((2, 0), (3.25, 0), (0, 2.75), (0, 1), centres=[None, ORIGIN, None, ORIGIN])
-    assert Shape("le1", 0.1, le1).area == pytest.approx(math.pi / 4 * (3.25 * 2.75 - 2), rel=1e-9)
+    assert st.Shape("le1", 0.1, le1).area == pytest.approx(math.pi / 4 * (3.25 * 2.75 - 2), rel=1e-9)
     # A half disc far away, of two arcs; and what is left where another is taken out.
     far = 1e3
     half = outline((far + 1, 0), (far, 1), (far - 1, 0), centres=[(far, 0), (far, 0)])
-    assert Shape("half", 1e-3, half).area == pytest.approx(math.pi / 2, rel=1e-9)
-    holes = [Hole.circle((0.5, 0.5), 0.1), Hole.ellipse((0.2, 0.2), 0.1, 0.05, part="core")]
-    assert Shape.rectangle(1, 1, holes=holes).area == pytest.approx(1 - math.pi * 0.01, rel=1e-9)
+    assert st.Shape("half", 1e-3, half).area == pytest.approx(math.pi / 2, rel=1e-9)
+    holes = [st.Hole.circle((0.5, 0.5), 0.1), st.Hole.ellipse((0.2, 0.2), 0.1, 0.05, part="core")]
+    assert st.Shape.rectangle(1, 1, holes=holes).area == pytest.approx(1 - math.pi * 0.01, rel=1e-9)
     lens = outline((0, 0), (1, 0), centres=[(0.5, 1.0), (0.5, -1.0)])
     r2, half_angle = 1.25, math.atan2(0.5, 1.0)
-    assert Shape("lens", 1e-3, lens).area == pytest.approx(r2 * (2 * half_angle - math.sin(2 * half_angle)), rel=1e-9)
+    assert st.Shape("lens", 1e-3, lens).area == pytest.approx(
+        r2 * (2 * half_angle - math.sin(2 * half_angle)), rel=1e-9
+    )
 
 
 @given(some.integers(3, 9), some.integers(0, 5), some.floats(0.3, 0.95))
@@ -78,18 +80,18 @@ def test_a_clockwise_outline_is_turned(count, first, inner):
         for radius, angle in [(1 if i % 2 else inner, 2 * math.pi * (i + first / 7) / count)]
     ]
     names = [f"side{i}" for i in range(count)]
-    forth = Shape("a", 1e-3, [Segment(corner, group=name) for corner, name in zip(corners, names)])
+    forth = st.Shape("a", 1e-3, [st.Segment(corner, group=name) for corner, name in zip(corners, names)])
     # The round from its first corner the other way: a side there ends where it began.
     corners = [corners[0], *corners[:0:-1]]
-    back = Shape("b", 1e-3, [Segment(corner, group=name) for corner, name in zip(corners, names[::-1])])
+    back = st.Shape("b", 1e-3, [st.Segment(corner, group=name) for corner, name in zip(corners, names[::-1])])
     assert back.area == pytest.approx(forth.area, rel=1e-9) and forth.area > 0
     ends = [{side.group: (side.start, side.end) for side in shape.rounds[0].sides} for shape in (forth, back)]
     assert ends[0] == ends[1]
 
 
 def test_what_is_around_a_round_is_the_smallest_part():
-    rings = [Hole.circle((0.5, 0.5), radius, part=f"r{radius}") for radius in (0.2, 0.4, 0.3)]
-    nested = Shape.rectangle(1, 1, holes=[*rings, Hole.circle((0.5, 0.5), 0.1)])
+    rings = [st.Hole.circle((0.5, 0.5), radius, part=f"r{radius}") for radius in (0.2, 0.4, 0.3)]
+    nested = st.Shape.rectangle(1, 1, holes=[*rings, st.Hole.circle((0.5, 0.5), 0.1)])
     assert [(one.inner, one.outer, one.around) for one in nested.rounds] == [
         ("", None, None),
         ("r0.2", "r0.3", 3),
@@ -105,7 +107,7 @@ def test_what_is_around_a_round_is_the_smallest_part():
 def test_points_by_a_side_are_put_on_it():
     """Coordinates of a point on an arc have few digits."""
     quarter = outline(ORIGIN, (0.1, 0), (0, 0.1), centres=[None, ORIGIN])
-    shape = Shape(
+    shape = st.Shape(
         "quarter", 1e-3, quarter, points={"on": ("70.7107 mm", "70.7107 mm"), "in": (0.05, 0.02), "o": (1e-9, 0)}
     )
     assert math.hypot(*shape.points["on"]) == pytest.approx(0.1, rel=1e-9)
@@ -114,8 +116,8 @@ def test_points_by_a_side_are_put_on_it():
 
 def test_what_a_shape_measures_is_its_label():
     le1 = outline((2, 0), (3.25, 0), (0, 2.75), (0, 1), centres=[None, ORIGIN, None, ORIGIN])
-    assert Shape("le1", 0.1, le1).label == "le1 (3250 x 2750 mm)"
-    bulge = Shape("bulge", 1e-3, outline(*SQUARE, centres=[None, (0.5, 0.5)]))
+    assert st.Shape("le1", 0.1, le1).label == "le1 (3250 x 2750 mm)"
+    bulge = st.Shape("bulge", 1e-3, outline(*SQUARE, centres=[None, (0.5, 0.5)]))
     assert bulge.extent == ((0, 0), pytest.approx((0.5 + math.sqrt(0.5), 1)))
-    own = Shape("own", "1 mm", file="own.msh", unit="1 mm")
+    own = st.Shape("own", "1 mm", file="own.msh", unit="1 mm")
     assert own.label == "own" and own.rounds == () and math.isnan(own.area) and own.unit == 1e-3

@@ -46,20 +46,11 @@ def stiffness(one):
     return st.SpringNet.from_scene(one, errors=False).stiffness
 
 
-NEWTON = {
-    "newton-xpbd": (0.1, st.Setting(1e-3, 5, 20), 0.01),
-    "newton-vbd": (0.3, st.Setting(1e-3, 5, 60), 0.01),
-}
+NEWTON = {"newton-xpbd": (0.1, st.Setting(1e-3, 5, 20), 0.01), "newton-vbd": (0.3, st.Setting(1e-3, 5, 60), 0.01)}
 """Decrement, setting and tolerance."""
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "newton-xpbd",
-        pytest.param("newton-vbd", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("name", ["newton-xpbd", pytest.param("newton-vbd", marks=pytest.mark.slow)])
 def test_springs_of_newton(name):
     """`kd` is a dashpot [N s/m]."""
     pytest.importorskip("newton")

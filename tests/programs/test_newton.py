@@ -11,10 +11,7 @@ from engine_scenes import TEN, scene
 
 pytest.importorskip("newton")
 
-SETTINGS = {
-    "newton-vbd": (1, 10),
-    "newton-xpbd": (0.7, 10),
-}
+SETTINGS = {"newton-vbd": (1, 10), "newton-xpbd": (0.7, 10)}
 """Step over the largest one of explicit schemes, and iterations, that converge to 1e-3 at the least cost."""
 
 TURNING = ("strip", "structured", "shear", "rubber")

@@ -9,11 +9,7 @@ import pytest
 import springtune as st
 
 LOCK = (Path(__file__).parents[2] / "requirements/engines.txt").read_text()
-PROGRAMS = {
-    "mujoco": "mujoco",
-    "newton": "newton",
-    "warp-lang": "warp",
-}
+PROGRAMS = {"mujoco": "mujoco", "newton": "newton", "warp-lang": "warp"}
 """Packages, and the modules that engines name in `needs`."""
 
 

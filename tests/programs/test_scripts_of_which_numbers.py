@@ -16,10 +16,7 @@ NODES = np.arange((COLUMNS + 1) * (ROWS + 1)).reshape(COLUMNS + 1, ROWS + 1)
 POINTS = A * np.array([[i + j / 2, j * 0.75**0.5] for i in range(COLUMNS + 1) for j in range(ROWS + 1)])
 LOW, HIGH = (
     np.stack([one.ravel() for one in corners], axis=1)
-    for corners in (
-        (NODES[:-1, :-1], NODES[1:, :-1], NODES[:-1, 1:]),
-        (NODES[1:, :-1], NODES[1:, 1:], NODES[:-1, 1:]),
-    )
+    for corners in ((NODES[:-1, :-1], NODES[1:, :-1], NODES[:-1, 1:]), (NODES[1:, :-1], NODES[1:, 1:], NODES[:-1, 1:]))
 )
 TRIANGLES = np.concatenate([LOW, HIGH])
 """Equilateral triangles in a sheet with slanted ends."""

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 import shapes_of_others as others
-from springtune.problem.geometry import Beam
+import springtune as st
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
-from springtune.problem.materials import Material
-from springtune.problem.shapes import Quantity, Traction
 from springtune.reference import calculix
 from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
 from springtune.reference.small_strain import solve_small_strain
 
-PULLED = (Quantity("end", "displacement", "right", "x"),)
+PULLED = (st.Quantity("end", "displacement", "right", "x"),)
 
 pytestmark = [
     pytest.mark.slow,
@@ -118,7 +116,7 @@ def test_sectors_whose_triangles_once_folded(seed):
     held = np.zeros(points.shape, dtype=bool)
     held[on(square, 1, 1.0)] = True
     load = 1e5 * shape.thickness * pressed(points, on(square, 0, 0.0), lambda way: np.array([way[1], -way[0]]))
-    material = Material(1e9, 0.3)
+    material = st.Material(1e9, 0.3)
     theirs = displaced(shape, points, elements, material, load, held)
     ours = solve_shape(shape, shape.loads["press"], material, tolerance=1e-5)
     for axis, name in enumerate("xy"):
@@ -156,10 +154,10 @@ def test_a_plate_with_a_hole():
 
 def test_rubber_with_a_hole():
     """Neo-Hooke at some 30 % strain, beside the hole at 80 %."""
-    shape, material = others.holed_plate()[0], Material(1e6, 0.4, name="rubber")
+    shape, material = others.holed_plate()[0], st.Material(1e6, 0.4, name="rubber")
     radius, size = 0.01, 0.05
     force = 0.3e6 * size * shape.thickness
-    case = replace(shape.loads["pull"], tractions=(Traction("right", (force, 0.0)),), quantities=PULLED)
+    case = replace(shape.loads["pull"], tractions=(st.Traction("right", (force, 0.0)),), quantities=PULLED)
 
     def place(s, t):
         angle = (1 - s) * np.pi / 2
@@ -198,7 +196,7 @@ def theirs_of(beam, material, force, size, kind=AXIAL, finite=False):
     return float(shares @ found)
 
 
-BEAM = Beam(0.2, 0.04, 1e-3, "200x40")
+BEAM = st.Beam(0.2, 0.04, 1e-3, "200x40")
 
 
 @pytest.mark.parametrize(
@@ -216,7 +214,7 @@ BEAM = Beam(0.2, 0.04, 1e-3, "200x40")
 )
 def test_small_strain(kind, force, nu, size, close):
     """Even elements are too stiff at the corners of the clamp."""
-    material = Material(210e9, nu, name="any")
+    material = st.Material(210e9, nu, name="any")
     theirs = theirs_of(BEAM, material, force, size, kind)
     ours = solve_small_strain(BEAM, material, force, kind=kind).displacement
     assert theirs == pytest.approx(ours, rel=close)
@@ -234,7 +232,7 @@ def test_small_strain(kind, force, nu, size, close):
     ],
 )
 def test_finite_strain(kind, force, length, size):
-    beam, material = Beam(length, 0.04, 1e-3, "beam"), Material(1e6, 0.4, name="rubber")
+    beam, material = st.Beam(length, 0.04, 1e-3, "beam"), st.Material(1e6, 0.4, name="rubber")
     theirs = theirs_of(beam, material, force, size, kind, finite=True)
     ours = solve_finite_strain(beam, material, force, kind=kind)
     # Even elements, too stiff at the corners: 5e-5 to 3e-4 as measured, in shear at five times the length of a clamp.
@@ -246,7 +244,7 @@ def test_finite_strain(kind, force, length, size):
 @pytest.mark.parametrize("kind", [AXIAL, BENDING, SHEAR, FACE])
 def test_plane_strain(kind, nu):
     """By elements CPE8 of even size, too stiff at the corners of the clamp, which are sharper towards nu = 0.5."""
-    material = Material(210e9, nu, name="steel", plane="strain")
+    material = st.Material(210e9, nu, name="steel", plane="strain")
     coarse, fine = (theirs_of(BEAM, material, 400e3, size, kind) for size in (4e-3, 2e-3))
     if kind == AXIAL and nu == 0.3:
         assert fine * 1e3 == pytest.approx(8.62447, abs=1e-5)
@@ -257,6 +255,6 @@ def test_plane_strain(kind, nu):
 
 
 def test_plane_strain_at_finite_strain():
-    material = Material(1e6, 0.4, name="rubber", plane="strain")
+    material = st.Material(1e6, 0.4, name="rubber", plane="strain")
     theirs = theirs_of(BEAM, material, 2.0, 2.5e-3, AXIAL, finite=True)
     assert theirs == pytest.approx(solve_finite_strain(BEAM, material, 2.0, kind=AXIAL).displacement, rel=5e-4)

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 import shapes_of_others as others
-from springtune.mesh.cells import Mesh, signed_areas
-from springtune.mesh.groups import GroupedMesh
+import springtune as st
+from springtune.mesh.cells import signed_areas
 from springtune.mesh.outlines import mesh_shape
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
-from springtune.problem.materials import Material
-from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.reference import shapes
 from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
@@ -20,8 +17,8 @@ from springtune.reference.triangles import side_fit, side_functions, tabulated
 
 from problems import pulled
 
-STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
-PLASTIC = Material(1e9, 0.3, name="plastic")
+STEEL = st.Material(210e9, 0.3, density=7850.0, name="steel")
+PLASTIC = st.Material(1e9, 0.3, name="plastic")
 FOLDED = [6, 62, 118, 197]
 """Random sectors whose triangles once folded."""
 
@@ -65,7 +62,7 @@ def converge(shape, load, materials, tractions=None, displacements=None, **optio
             return held, values
 
     own = tuple(one for one in load.tractions if one.group not in tractions)
-    load = replace(load, tractions=(*own, *(Traction(group, (0.0, 0.0)) for group in tractions)))
+    load = replace(load, tractions=(*own, *(st.Traction(group, (0.0, 0.0)) for group in tractions)))
     return solve_shape(shape, load, materials, level_of=Prescribed, **options)
 
 
@@ -78,7 +75,7 @@ def any_sheet(seed):
 def disc(radius, group=""):
     """A round of four arcs about the origin."""
     corners = [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)]
-    return tuple(Segment(corner, (0.0, 0.0), group) for corner in corners)
+    return tuple(st.Segment(corner, (0.0, 0.0), group) for corner in corners)
 
 
 @pytest.mark.parametrize(("name", "case"), EVERY)
@@ -138,8 +135,8 @@ def test_patch(name):
     def affine(points, _):
         return points @ gradient.T + shift
 
-    held = tuple(Support(side, 1.0, 1.0) for side in sides)
-    load = LoadCase("patch", held, quantities=(Quantity("area", "area"), Quantity("energy", "energy")))
+    held = tuple(st.Support(side, 1.0, 1.0) for side in sides)
+    load = st.LoadCase("patch", held, quantities=(st.Quantity("area", "area"), st.Quantity("energy", "energy")))
     prescribed = dict.fromkeys(sides, affine)
     strain = np.array([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
     stress = sheet.plane_stress @ strain
@@ -161,9 +158,9 @@ def test_kirsch():
     """A quarter of a plate with a hole under the tractions of the plate without end: stress concentration 3."""
     shape, material = others.holed_plate()
     quantities = (
-        Quantity("top", "stress", "top-of-the-hole", "xx"),
-        Quantity("side", "stress", "side-of-the-hole", "yy"),
-        Quantity("out", "displacement", "side-of-the-hole", "x"),
+        st.Quantity("top", "stress", "top-of-the-hole", "xx"),
+        st.Quantity("side", "stress", "side-of-the-hole", "yy"),
+        st.Quantity("out", "displacement", "side-of-the-hole", "x"),
     )
     load = replace(shape.loads["pull"], quantities=quantities)
 
@@ -220,7 +217,7 @@ def test_a_re_entrant_corner():
     Exponent and factor: Szabo and Babuska, Finite Element Analysis (1991), section 10.
     """
     exponent, factor, nu = 0.544483736782464, 0.543075578836737, 0.3
-    material = Material(1.0, nu)
+    material = st.Material(1.0, nu)
     kappa, shear = (3 - nu) / (1 + nu), 1 / (2 * (1 + nu))
     turn = np.array([[1.0, -1.0], [1.0, 1.0]]) / np.sqrt(2)  # the bisector is at 45 degrees
 
@@ -234,15 +231,15 @@ def test_a_re_entrant_corner():
 
     corners = [(0.0, 0.0), (0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, 0.0)]
     groups = ("notch", "rest", "rest", "rest", "rest", "notch")
-    shape = Shape("L", 1.0, tuple(Segment(corner, group=group) for corner, group in zip(corners, groups)))
-    rest = (Support("rest", 1.0, 1.0),)
-    found = converge(shape, LoadCase("pull", rest), {"": material}, displacements={"rest": field}, tolerance=1e-5)
+    shape = st.Shape("L", 1.0, tuple(st.Segment(corner, group=group) for corner, group in zip(corners, groups)))
+    rest = (st.Support("rest", 1.0, 1.0),)
+    found = converge(shape, st.LoadCase("pull", rest), {"": material}, displacements={"rest": field}, tolerance=1e-5)
     points = np.random.default_rng(5).uniform(-1, 1, (300, 2))
     points = points[(points > 0).any(axis=1)]
     error = np.abs(found.at(points) - field(points)).max() / np.abs(field(points)).max()
     assert error < 1e-4
     refused = replace(shape, points={"corner": (0.0, 0.0)})
-    load = LoadCase("pull", rest, quantities=(Quantity("stress", "stress", "corner", "xx"),))
+    load = st.LoadCase("pull", rest, quantities=(st.Quantity("stress", "stress", "corner", "xx"),))
     with pytest.raises(ValueError, match="'stress': the stress at 'corner' is infinite.*corner of 270 degrees"):
         converge(refused, load, {"": material}, displacements={"rest": field})
 
@@ -252,16 +249,20 @@ SIDE_NAMES = {TOP: "upper", BOTTOM: "lower", LEFT: "left", RIGHT: "right"}
 
 @pytest.mark.parametrize("kind", LOAD_KINDS.values(), ids=LOAD_KINDS)
 def test_rectangles_agree_with_their_own_reference(kind):
-    beam, component = Beam(0.1, 0.04, 1e-3), "xy"[kind.axis]
-    held = (Support(SIDE_NAMES[side], *(0.0 if axis in axes else None for axis in (0, 1))) for side, axes in kind.held)
+    beam, component = st.Beam(0.1, 0.04, 1e-3), "xy"[kind.axis]
+    held = (
+        st.Support(SIDE_NAMES[side], *(0.0 if axis in axes else None for axis in range(2))) for side, axes in kind.held
+    )
     force = (1e3, 0.0) if kind.axis == 0 else (0.0, 1e3)
-    quantities = [Quantity("mean", "displacement", SIDE_NAMES[kind.loaded], component)]
+    quantities = [st.Quantity("mean", "displacement", SIDE_NAMES[kind.loaded], component)]
     points = {}
     if kind.pressed:
         points = {"middle": (beam.length / 2, beam.height)}
-        quantities.append(Quantity("middle", "displacement", "middle", component))
-    load = LoadCase("load", tuple(held), (Traction(SIDE_NAMES[kind.loaded], force),), quantities=tuple(quantities))
-    shape = Shape.rectangle(beam.length, beam.height, thickness=beam.thickness, points=points)
+        quantities.append(st.Quantity("middle", "displacement", "middle", component))
+    load = st.LoadCase(
+        "load", tuple(held), (st.Traction(SIDE_NAMES[kind.loaded], force),), quantities=tuple(quantities)
+    )
+    shape = st.Shape.rectangle(beam.length, beam.height, thickness=beam.thickness, points=points)
     found, known = solve_shape(shape, load, STEEL), solve_small_strain(beam, STEEL, 1e3, kind=kind)
     exact = {"mean": known.mean_displacement, "middle": known.displacement}
     for name, error in found.error_estimates.items():
@@ -275,13 +276,13 @@ def test_two_materials_one_behind_the_other():
     x = np.linspace(0, 3, 4)
     points = np.array([(a, b) for a in x for b in (0.0, 1.0)])
     quads = np.array([[2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1] for i in range(3)])
-    mesh = Mesh(points, np.zeros((0, 3), dtype=int), quads)
+    mesh = st.Mesh(points, np.zeros((0, 3), dtype=int), quads)
     sides = {"left": np.array([[1, 0]]), "right": np.array([[6, 7]]), "lower": np.array([[0, 2], [2, 4], [4, 6]])}
-    grouped = GroupedMesh(mesh, sides, {}, {"soft": {4: np.array([False, True, False])}})
-    rollers = (Support("left", x=0.0), Support("lower", y=0.0))
-    load = pulled(3.0, 0.0, supports=rollers, others=[Quantity("held", "reaction", "left", "x")])
-    shape = Shape("bar", 0.5, file="bar.msh")
-    materials = {"": Material(100.0, 0.0), "soft": Material(10.0, 0.0)}
+    grouped = st.GroupedMesh(mesh, sides, {}, {"soft": {4: np.array([False, True, False])}})
+    rollers = (st.Support("left", x=0.0), st.Support("lower", y=0.0))
+    load = pulled(3.0, 0.0, supports=rollers, others=[st.Quantity("held", "reaction", "left", "x")])
+    shape = st.Shape("bar", 0.5, file="bar.msh")
+    materials = {"": st.Material(100.0, 0.0), "soft": st.Material(10.0, 0.0)}
     found = solve_shape(shape, load, materials, grouped)
     assert found.values["end"] == pytest.approx(3 / 0.5 * (2 / 100 + 1 / 10), rel=1e-9)
     assert found.values["held"] == pytest.approx(-3.0, rel=1e-9)
@@ -292,15 +293,15 @@ def test_two_materials_one_behind_the_other():
 def test_a_round_inclusion():
     """A stiff core in a disc whose rim is moved outwards: u = A r in the core, B r + C / r around it."""
     inner, outer, thickness, strain = 0.3, 1.0, 0.1, 1e-3
-    core, around = Material(70.0, 0.2), Material(3.0, 0.45)
+    core, around = st.Material(70.0, 0.2), st.Material(3.0, 0.45)
     stiff = core.young_modulus / (1 - core.poisson_ratio)
     even, odd = (around.young_modulus / (1 + sign * around.poisson_ratio) for sign in (-1, 1))
     # Rows: displacement and stress at the core's rim, displacement at the outer one.
     system = [[inner, -inner, -1 / inner], [stiff, -even, odd / inner**2], [0.0, outer, 1 / outer]]
     a, b, c = np.linalg.solve(system, [0.0, 0.0, strain * outer])
-    shape = Shape("disc", thickness, disc(outer, "rim"), (Hole(disc(inner), "core"),), points={"out": (0.6, 0.2)})
-    quantities = (Quantity("energy", "energy"), Quantity("out", "displacement", "out", "x"))
-    load = LoadCase("grow", (Support("rim", 1.0, 1.0),), quantities=quantities)
+    shape = st.Shape("disc", thickness, disc(outer, "rim"), (st.Hole(disc(inner), "core"),), points={"out": (0.6, 0.2)})
+    quantities = (st.Quantity("energy", "energy"), st.Quantity("out", "displacement", "out", "x"))
+    load = st.LoadCase("grow", (st.Support("rim", 1.0, 1.0),), quantities=quantities)
     found = converge(
         shape,
         load,
@@ -314,7 +315,7 @@ def test_a_round_inclusion():
     assert found.values["out"] == pytest.approx((b + c / r**2) * 0.6, rel=1e-6)
     np.testing.assert_allclose(found.at(np.array([[0.1, 0.05]])), [[a * 0.1, a * 0.05]], rtol=1e-6)
     rim = replace(shape, points={"bond": (0.0, inner)})
-    jump = replace(load, quantities=(Quantity("jump", "stress", "bond", "xx"),))
+    jump = replace(load, quantities=(st.Quantity("jump", "stress", "bond", "xx"),))
     with pytest.raises(ValueError, match="'jump': 'bond' is where parts of different materials meet.*jump"):
         solve_shape(rim, jump, {"": around, "core": core})
     assert found.stress_at(np.array([[0.1, 0.05]]))[0] == pytest.approx([stiff * a, stiff * a, 0], abs=1e-5 * stiff * a)
@@ -322,10 +323,10 @@ def test_a_round_inclusion():
 
 def test_gravity():
     """A column that hangs: its end moves by rho g L^2 / (2 E), and its root carries its weight."""
-    shape = Shape.rectangle("20 mm", "100 mm", thickness="1 mm")
-    material = Material(1e6, 0.0, density=1000.0)
-    quantities = (Quantity("end", "displacement", "lower", "y"), Quantity("held", "reaction", "upper", "y"))
-    load = LoadCase("hang", (Support("upper", 0.0, 0.0),), gravity=(0.0, -9.81), quantities=quantities)
+    shape = st.Shape.rectangle("20 mm", "100 mm", thickness="1 mm")
+    material = st.Material(1e6, 0.0, density=1000.0)
+    quantities = (st.Quantity("end", "displacement", "lower", "y"), st.Quantity("held", "reaction", "upper", "y"))
+    load = st.LoadCase("hang", (st.Support("upper", 0.0, 0.0),), gravity=(0.0, -9.81), quantities=quantities)
     found = solve_shape(shape, load, material)
     assert found.values["end"] == pytest.approx(-1000 * 9.81 * 0.1**2 / 2e6, rel=1e-9)
     assert found.values["held"] == pytest.approx(1000 * 9.81 * 0.02 * 0.1 * 1e-3, rel=1e-9)
@@ -335,7 +336,7 @@ def test_a_polygon_for_a_circle_has_infinite_stresses():
     """Displacements of a mesh converge; the stress at a corner of its outline does not, and says what to do."""
     shape, material = others.holed_plate()
     load = shape.loads["pull"]
-    of_file, grouped = Shape("plate", shape.thickness, file="plate.msh"), mesh_shape(shape, 2e-3)
+    of_file, grouped = st.Shape("plate", shape.thickness, file="plate.msh"), mesh_shape(shape, 2e-3)
     with pytest.raises(ValueError, match="'top-of-the-hole' is infinite.*give the shape as an outline with arcs"):
         solve_shape(of_file, load, material, grouped)
     (alone,), lacking = solve_each(of_file, replace(load, quantities=load.quantities[:2]), material, grouped)
@@ -351,7 +352,7 @@ def test_scaled():
     once = solve_shape(shape, load, material)
     scaled, direct = (
         once.scaled(-3.0),
-        solve_shape(shape, replace(load, pressures=(Pressure("inner", -3e6),)), material),
+        solve_shape(shape, replace(load, pressures=(st.Pressure("inner", -3e6),)), material),
     )
     assert scaled.values == pytest.approx(direct.values, rel=1e-9)
     assert (scaled.energy, scaled.rotation, scaled.strain) == pytest.approx(
@@ -364,23 +365,23 @@ def test_scaled():
 
 def square(quantities, supports=None, points=None, **load):
     """A unit square, clamped on the left."""
-    supports = (Support("left", 0.0, 0.0),) if supports is None else supports
-    return Shape.rectangle(1.0, 1.0, thickness=1.0, points=points or {}), LoadCase(
+    supports = (st.Support("left", 0.0, 0.0),) if supports is None else supports
+    return st.Shape.rectangle(1.0, 1.0, thickness=1.0, points=points or {}), st.LoadCase(
         "load", supports, quantities=quantities, **load
     )
 
 
 def test_point_forces():
     """What is infinite under one is refused by tests/refused_calls.yaml; the rest converges."""
-    points, force = {"tip": (1.0, 0.5)}, (Traction("tip", (0.0, 1.0)),)
-    far = Quantity("far", "displacement", "right", "y")
-    held = Quantity("held", "reaction", "left", "y")
-    found = solve_shape(*square((far, held), points=points, tractions=force), Material(1.0, 0.3))
+    points, force = {"tip": (1.0, 0.5)}, (st.Traction("tip", (0.0, 1.0)),)
+    far = st.Quantity("far", "displacement", "right", "y")
+    held = st.Quantity("held", "reaction", "left", "y")
+    found = solve_shape(*square((far, held), points=points, tractions=force), st.Material(1.0, 0.3))
     assert found.values["held"] == pytest.approx(-1.0, rel=1e-9)
     # What a force at the tip does to the side, one on the side does to the tip (Betti).
-    under = Quantity("under", "displacement", "tip", "y")
-    even = (Traction("right", (0.0, 1.0)),)
-    spread = solve_shape(*square((under,), points=points, tractions=even), Material(1.0, 0.3))
+    under = st.Quantity("under", "displacement", "tip", "y")
+    even = (st.Traction("right", (0.0, 1.0)),)
+    spread = solve_shape(*square((under,), points=points, tractions=even), st.Material(1.0, 0.3))
     both = found.error_estimates["far"] + spread.error_estimates["under"]
     assert found.values["far"] == pytest.approx(spread.values["under"], rel=both)
 
@@ -388,32 +389,32 @@ def test_point_forces():
 def test_points_that_are_held():
     """Pins that keep a body from moving carry nothing; others give way, and are refused."""
     points = {"pin": (0.0, 0.0), "link": (0.0, 1.0)}
-    pins = (Support("pin", 0.0, 0.0), Support("link", x=0.0))
-    end = Quantity("end", "displacement", "right", "x")
-    even = {"": Material(1.0, 0.3)}
-    pull = (Traction("left", (-1.0, 0.0)), Traction("right", (1.0, 0.0)))
+    pins = (st.Support("pin", 0.0, 0.0), st.Support("link", x=0.0))
+    end = st.Quantity("end", "displacement", "right", "x")
+    even = {"": st.Material(1.0, 0.3)}
+    pull = (st.Traction("left", (-1.0, 0.0)), st.Traction("right", (1.0, 0.0)))
     shape, load = square((end,), pins, points, tractions=pull)
     assert solve_shape(shape, load, even).values["end"] == pytest.approx(1.0, rel=1e-9)
-    sideways = replace(load, tractions=(Traction("right", (0.0, 1.0)),))
+    sideways = replace(load, tractions=(st.Traction("right", (0.0, 1.0)),))
     with pytest.raises(ReferenceNotConvergedError, match="'end'.*hold sides, not 'pin', 'link'"):
         solve_shape(shape, sideways, even)
 
 
 def test_a_stress_that_does_not_converge():
     """At the end of a clamp; the refusal names quantity, level and what is there."""
-    stress = Quantity("root", "stress", "corner", "xx")
-    shape, load = square((stress,), points={"corner": (0.0, 1.0)}, tractions=(Traction("right", (1.0, 0.0)),))
+    stress = st.Quantity("root", "stress", "corner", "xx")
+    shape, load = square((stress,), points={"corner": (0.0, 1.0)}, tractions=(st.Traction("right", (1.0, 0.0)),))
     message = (
         "'root' of 'corner': relative error estimate .* at degree 10 .*angle of 90 degrees: the stress there may be"
     )
     with pytest.raises(ReferenceNotConvergedError, match=message):
-        solve_shape(shape, load, Material(1.0, 0.3))
+        solve_shape(shape, load, st.Material(1.0, 0.3))
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
 def test_a_sector_whose_triangles_once_folded(factor):
     """Right values are of quadratic triangles on three meshes, to 2e-6, and of CalculiX."""
     shape = others.sector(np.radians(120), 0.055, 0.1, [(0.005, np.radians(55), 0.0775)])
-    found = solve_shape(shape, shape.loads["press"], Material(factor * 1e9, 0.3))
+    found = solve_shape(shape, shape.loads["press"], st.Material(factor * 1e9, 0.3))
     for axis, right in (("x", 3.78166e-4), ("y", 4.26196e-4)):
         assert found.values[axis] * factor == pytest.approx(right, rel=found.error_estimates[axis] + 3e-6)

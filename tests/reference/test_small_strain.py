@@ -5,14 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 from scipy.optimize import brentq
 from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, MeshQuad, condense, solve
 from skfem.models.elasticity import linear_elasticity
 
-from springtune.problem.geometry import Beam
+import springtune as st
 from springtune.problem.loads import AXIAL, BENDING, BOTH, FACE, LEFT, LOAD_KINDS, RIGHT, SHEAR, TOP, LoadKind
-from springtune.problem.materials import Material
 from springtune.reference.answers import outline
 from springtune.reference.small_strain import (
     FIRST_LEVEL,
@@ -22,13 +21,13 @@ from springtune.reference.small_strain import (
     solve_unit,
 )
 
-STEEL = Material(210e9, 0.3, name="steel")
-RUBBER = Material(1e6, 0.5, name="rubber")
+STEEL = st.Material(210e9, 0.3, name="steel")
+RUBBER = st.Material(1e6, 0.5, name="rubber")
 
 
 def beam(length, height):
     """A beam of 1 mm thickness from its sides in mm."""
-    return Beam(length / 1e3, height / 1e3, 1e-3, f"{length:g}x{height:g}")
+    return st.Beam(length / 1e3, height / 1e3, 1e-3, f"{length:g}x{height:g}")
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +94,7 @@ def test_beams_of_the_paper(material, length, height, force, expected, stiff):
 
 @pytest.mark.parametrize(("length", "height"), [(200, 40), (100, 20), (30, 60)])
 def test_without_lateral_contraction_the_bar_is_uniform(length, height):
-    result = solve_small_strain(beam(length, height), Material(2e7, 0.0, name="cork"), -35.0)
+    result = solve_small_strain(beam(length, height), st.Material(2e7, 0.0, name="cork"), -35.0)
     strain = -35.0 / (2e7 * height / 1e3 * 1e-3)
     # The space contains the answer: what is left is round-off, which the estimate must own up to.
     assert result.displacement == pytest.approx(strain * length / 1e3, rel=1e-9)
@@ -112,9 +111,9 @@ def test_without_lateral_contraction_the_bar_is_uniform(length, height):
 @pytest.mark.parametrize(("aspect_ratio", "nu"), [(2, 0.5), (1.5, 0.3)])
 def test_agrees_with_quadratic_elements_graded_towards_the_corners(kind, count, close, aspect_ratio, nu):
     """Cubed coordinates restore their full rate, the 4th power of their number: 12 lack 15 times less than 6."""
-    body = Beam(2 * aspect_ratio, 2.0, 1.0, "unit")
+    body = st.Beam(2 * aspect_ratio, 2.0, 1.0, "unit")
     side = 2.0 * aspect_ratio if kind == SHEAR else 2.0
-    result = solve_small_strain(body, Material(1.0, nu, name="unit"), side, kind=kind)
+    result = solve_small_strain(body, st.Material(1.0, nu, name="unit"), side, kind=kind)
     independent = quadratic(aspect_ratio, nu, count, 3, kind)
     assert result.displacement == pytest.approx(independent, rel=close)
     assert independent < UnitLevel(2.0 * aspect_ratio, nu, 7, kind).displacement  # Ritz: fewer unknowns are stiffer
@@ -124,7 +123,7 @@ def test_agrees_with_quadratic_elements_graded_towards_the_corners(kind, count, 
 def test_slender_beams_by_hand(kind):
     """Timoshenko's cantilever, and a block so wide that its ends do not count."""
     aspect_ratio, nu = 20.0, 0.3
-    result = solve_small_strain(Beam(aspect_ratio, 1.0, 1.0, "b"), Material(1.0, nu, name="unit"), 1.0, kind=kind)
+    result = solve_small_strain(st.Beam(aspect_ratio, 1.0, 1.0, "b"), st.Material(1.0, nu, name="unit"), 1.0, kind=kind)
     if kind == BENDING:
         expected = 4 * aspect_ratio**3 + 1.2 * 2 * (1 + nu) * aspect_ratio
         assert result.displacement == pytest.approx(expected, rel=1e-3)
@@ -148,8 +147,8 @@ def interior(nu):
 @pytest.mark.parametrize("nu", [0.0, 0.5])
 @pytest.mark.parametrize("aspect_ratio", [40, 3000])
 def test_slender_cantilevers_follow_the_cubic_of_short_ones(aspect_ratio, nu):
-    body = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "slender")
-    result = solve_small_strain(body, Material(3e9, nu, name="any"), 7.0, kind=BENDING)
+    body = st.Beam(aspect_ratio * 0.01, 0.01, 1e-3, "slender")
+    result = solve_small_strain(body, st.Material(3e9, nu, name="any"), 7.0, kind=BENDING)
     exact = np.polyval(interior(nu), aspect_ratio) * 7.0 / (2 * 3e9 * 1e-3)
     assert result.error_estimate <= 1e-6
     # The cubic's own error: that of level 8 at the corners, some 1e-12.
@@ -205,9 +204,9 @@ def test_the_bound_of_rounding_is_positive_where_bodies_grow_thicker_as_they_are
 
 
 @settings(max_examples=12)
-@given(aspect_ratio=st.floats(0.2, 30), nu=st.floats(0, 0.5), kind=st.sampled_from(list(LOAD_KINDS.values())))
+@given(aspect_ratio=some.floats(0.2, 30), nu=some.floats(0, 0.5), kind=some.sampled_from(list(LOAD_KINDS.values())))
 def test_error_estimate_is_honest(aspect_ratio, nu, kind):
-    body, material = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any"), Material(3e9, nu, name="any")
+    body, material = st.Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any"), st.Material(3e9, nu, name="any")
     result = solve_small_strain(body, material, 7.0, kind=kind)
     assert result.error_estimate <= 1e-4
     # Level 7 has smaller elements at the corners and polynomials of a higher degree than what converged.
@@ -260,8 +259,8 @@ def test_proportional_to_the_force(solution):
 
 
 def test_thickness_and_young_modulus_divide(solution):
-    thick = Beam(0.2, 0.04, 4e-3, "200x40")
-    soft = Material(STEEL.young_modulus / 2, STEEL.poisson_ratio, name="soft")
+    thick = st.Beam(0.2, 0.04, 4e-3, "200x40")
+    soft = st.Material(STEEL.young_modulus / 2, STEEL.poisson_ratio, name="soft")
     assert solve_small_strain(thick, soft, 400e3).displacement == pytest.approx(solution.displacement / 2, rel=1e-9)
 
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 
-from springtune.problem.geometry import Beam
+import springtune as st
 from springtune.problem.loads import BENDING
-from springtune.problem.materials import Material
 from springtune.reference.answers import (
     beyond_linear,
     elastica,
@@ -16,13 +15,13 @@ from springtune.reference.answers import (
 )
 from springtune.reference.small_strain import solve_small_strain
 
-STEEL = Material(210e9, 0.3, name="steel")
+STEEL = st.Material(210e9, 0.3, name="steel")
 
 
 def bent(load, slenderness=20.0, nu=0.3):
     """Reference of a cantilever and its force, which is the load times E I / L^2."""
-    beam = Beam(slenderness * 0.01, 0.01, 1e-3, "b")
-    material = Material(1e9, nu, name="any")
+    beam = st.Beam(slenderness * 0.01, 0.01, 1e-3, "b")
+    material = st.Material(1e9, nu, name="any")
     force = load * material.young_modulus * beam.thickness * beam.height**3 / 12 / beam.length**2
     return solve_small_strain(beam, material, force, kind=BENDING)
 
@@ -83,7 +82,7 @@ def test_a_bent_beam_is_beyond_the_linear_reference_from_one_percent_on(load, ap
 
 
 def test_the_paper_s_traction_applies():
-    found = solve_small_strain(Beam(0.2, 0.04, 1e-3, "200x40"), STEEL, 400e3)
+    found = solve_small_strain(st.Beam(0.2, 0.04, 1e-3, "200x40"), STEEL, 400e3)
     assert found.strain == pytest.approx(400e3 / (210e9 * 40e-6), rel=0.05)  # 4.8 %
     assert found.rotation < 0.02
     assert beyond_linear(found.rotation, found.strain) == ""

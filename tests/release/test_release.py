@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-import springtune
+import springtune as st
 
 REPOSITORY = Path(__file__).parents[2]
-NAME = f"springtune-{springtune.__version__}"
+NAME = f"springtune-{st.__version__}"
 
 WITHIN = re.compile(
     r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|studies/output/page\.html)"
@@ -84,7 +84,7 @@ def description(wheel):
     """What a package index shows as the project's page."""
     with zipfile.ZipFile(wheel) as file:
         metadata = Parser().parsestr(file.read(f"{NAME}.dist-info/METADATA").decode())
-    assert metadata["Version"] == springtune.__version__
+    assert metadata["Version"] == st.__version__
     assert metadata["Description-Content-Type"] == "text/markdown"
     return metadata.get_payload()
 
@@ -160,16 +160,16 @@ def test_no_package_is_missing_to_any_module(call):
     """Whatever the package imports is declared; what belongs to an extra is imported where it is used."""
     program = (
         "import importlib, pkgutil, springtune\n"
-        "for one in pkgutil.walk_packages(springtune.__path__, 'springtune.'):\n"
+        "for one in pkgutil.walk_packages(st.__path__, 'springtune.'):\n"
         "    if not one.name.endswith('__main__'):\n"
         "        importlib.import_module(one.name)\n"
         "import snakemake_logger_plugin_springtune\n"
-        "for name in springtune.__all__:\n"
+        "for name in st.__all__:\n"
         "    getattr(springtune, name)\n"
     )
     found = call("python", "-c", program)
     assert found.returncode == 0, found.stderr
-    assert call("springtune", "--version").stdout.split()[-1] == springtune.__version__
+    assert call("springtune", "--version").stdout.split()[-1] == st.__version__
 
 
 def test_the_scene_of_the_readme_is_solved(call, description):
@@ -194,7 +194,7 @@ def read_only(empty):
 def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, shape):
     """With Python alone: no clone, no git, and an environment that is only read."""
     before = {path: path.stat().st_mtime_ns for path in empty.parent.rglob("*")}
-    touch = "import pathlib, springtune; pathlib.Path(springtune.__file__).with_name('touched').touch()"
+    touch = "import pathlib, springtune; pathlib.Path(st.__file__).with_name('touched').touch()"
     assert "Permission denied" in call("python", "-c", touch, **read_only).stderr
     assert call("python", "-c", "import shutil; print(shutil.which('git'))", **read_only).stdout == "None\n"
     written = call("springtune", "new", "mine", *shape, **read_only)
@@ -205,7 +205,7 @@ def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, s
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert re.search(r"^results +results/mine: index.html, dataset.nc", ran.stdout + ran.stderr, re.MULTILINE)
     told = call("springtune", "info", "results/mine", **read_only)
-    assert f"{scenes} asked, {scenes} solved" in told.stdout and f"springtune {springtune.__version__}" in told.stdout
+    assert f"{scenes} asked, {scenes} solved" in told.stdout and f"springtune {st.__version__}" in told.stdout
     assert "commit" not in told.stdout  # of a tree without git
     assert "unknown" not in (call.here / "results/mine/tables/index.html").read_text()
     assert (call.here / "results/mine/index.html").stat().st_size > 100_000

@@ -13,7 +13,7 @@ import xarray as xr
 
 sys.path.append(str(Path(__file__).parents[1] / "support"))  # for `campaigns`, where this is a program
 
-from springtune.mesh import MESH_TYPES
+import springtune as st
 from springtune.studies.runs import attempts, rerun
 
 from campaigns import Campaign
@@ -80,7 +80,7 @@ def prepare(folder):
 
 def write_mesh(path, shift=0.0):
     """Write a mesh of one's own, points inside shifted [m]."""
-    mesh = MESH_TYPES["structured"](0.02, 0.01, 5e-3)
+    mesh = st.MESH_TYPES["structured"](0.02, 0.01, 5e-3)
     points = mesh.points.copy()
     points[((points > 1e-9) & (points < [0.02 - 1e-9, 0.01 - 1e-9])).all(axis=1)] += shift
     points = np.column_stack([1e3 * points, np.zeros(len(points))])

@@ -12,7 +12,7 @@ import driver
 import pytest
 from rows import CODE, STORED, STUDY
 
-import springtune
+import springtune as st
 from springtune.studies.runs import rerun
 from springtune.studies.runs.source import read_note
 
@@ -129,7 +129,7 @@ def test_exactly_these_results_are_computed_and_the_dataset_is_that_of_a_fresh_r
 def package(tmp_path_factory):
     """A copy of the package, to be edited."""
     folder = tmp_path_factory.mktemp("package") / "springtune"
-    shutil.copytree(Path(springtune.__file__).parent, folder)  # with what is compiled, and its times
+    shutil.copytree(Path(st.__file__).parent, folder)  # with what is compiled, and its times
     return folder
 
 

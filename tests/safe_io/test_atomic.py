@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from springtune.mesh import MESH_TYPES, write_mesh
+import springtune as st
+from springtune.mesh import write_mesh
 from springtune.safe_io import atomic
 
 
@@ -30,7 +31,7 @@ def test_an_error_leaves_what_was_there(tmp_path):
 def test_an_unfinished_mesh_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "replace", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        write_mesh(tmp_path / "mesh.vtu", MESH_TYPES["right"](0.05, 0.02, 1e-2))
+        write_mesh(tmp_path / "mesh.vtu", st.MESH_TYPES["right"](0.05, 0.02, 1e-2))
     assert not list(tmp_path.iterdir())
 
 

@@ -9,7 +9,6 @@ import springtune as st
 from springtune.mechanics.network import Network
 from springtune.reference.shapes import solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError
-from springtune.springs import DEFINITIONS
 from springtune.springs.identification import patch_cases
 
 from problems import pulled
@@ -179,7 +178,7 @@ def test_even_tests_of_a_body_without_a_lower_side_do_not_contradict_their_suppo
     rhombus = st.Shape("rhombus", 1e-3, [st.Segment(corner) for corner in corners])
     for shape in (rhombus, st.Shape.rectangle(0.03, 0.05, holes=[st.Hole.circle((0.015, 0.02), 0.005)])):
         mesh = st.mesh_shape(shape, "10 mm").mesh
-        springs = DEFINITIONS["delingette"].springs(mesh, material, 1e-3)
+        springs = st.DEFINITIONS["delingette"].springs(mesh, material, 1e-3)
         for case in patch_cases(mesh, material, 1e-3):
             assert np.abs(case.displacements[case.held]).max() <= 1e-9 * np.abs(case.displacements).max()
             assert np.abs(case.forces.sum(axis=0)).max() <= 1e-9 * np.abs(case.forces).max()

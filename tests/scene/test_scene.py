@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
 from springtune.scene.mesh_cache import MeshCache
 from springtune.studies.kinds.bodies.solve import solve, solve_beam
 from springtune.studies.output.dataset import STATUS
@@ -129,11 +127,11 @@ class TestErrors:
 
 
 def test_a_status_reads_as_in_a_dataset():
-    assert [str(flag) for flag in Status] == list(STATUS) and f"{Status.SOLVED}" == "solved"
-    assert [int(flag) for flag in Status] == list(range(len(STATUS)))
+    assert [str(flag) for flag in st.Status] == list(STATUS) and f"{st.Status.SOLVED}" == "solved"
+    assert [int(flag) for flag in st.Status] == list(range(len(STATUS)))
 
 
-MATERIAL = asdict(Material(210e9, 0.3, name="steel"))
+MATERIAL = asdict(st.Material(210e9, 0.3, name="steel"))
 
 
 def task_of(definition, kinematics):
@@ -151,7 +149,7 @@ def test_the_time_of_a_definition_is_taken_off_the_scene_that_spent_it_alone():
         results.append(solve(task_of("adjoint", kinematics), partial(solve_beam, beam, sheet, None)))
         elapsed = time.perf_counter() - begin
         deriving.append(sheet.deriving - before)
-        assert results[-1]["status"] == Status.SOLVED
+        assert results[-1]["status"] == st.Status.SOLVED
         # However busy the machine is, parts take no longer than all of it, and counting one twice would.
         assert 0 < results[-1]["seconds"] <= elapsed - deriving[-1]
     assert deriving[0] > 0 and deriving[1:] == [0.0, 0.0]

@@ -13,15 +13,8 @@ from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mechanics.stress import cell_stresses, particle_stresses
-from springtune.mesh import MESH_TYPES
-from springtune.mesh.groups import GroupedMesh
-from springtune.problem.boundary import (
-    cell_at,
-    displacement_weights,
-    forces,
-)
+from springtune.problem.boundary import cell_at, displacement_weights, forces
 from springtune.problem.geometry import AssumptionWarning
-from springtune.springs import DEFINITIONS
 
 from problems import free_network
 
@@ -86,10 +79,10 @@ class TestAffineFields:
         assert found.displacement == found.values["end"]
 
     def test_a_mesh_of_quadrilaterals(self):
-        mesh = MESH_TYPES["braced"](LENGTH, HEIGHT, 7e-3)
+        mesh = st.MESH_TYPES["braced"](LENGTH, HEIGHT, 7e-3)
         sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
         sides["lower"] = mesh.outline_edges(1, 0.0)
-        grouped = GroupedMesh(mesh, sides, {"somewhere": np.array([0.037, 0.013])})
+        grouped = st.GroupedMesh(mesh, sides, {"somewhere": np.array([0.037, 0.013])})
         pull = load(
             END,
             st.Quantity("side", "displacement", "somewhere", "y"),
@@ -232,11 +225,7 @@ def test_a_bar_hangs_by_its_weight():
     """Its end moves by rho g L^2 / (2 E), on any mesh: an even pull on the end, which linear triangles answer exactly,
     does the same work on both. Its support carries all of it.
     """
-    hang = load(
-        END,
-        st.Quantity("carried", "reaction", "left", "x"),
-        gravity=(9.81, 0.0),
-    )
+    hang = load(END, st.Quantity("carried", "reaction", "left", "x"), gravity=(9.81, 0.0))
     shape = plate(hang)
     material = st.Material("1 MPa", 0.0, density="1000 kg/m^3")
     values = solved(shape, st.mesh_shape(shape, 7e-3), material).values
@@ -278,7 +267,7 @@ def test_recovered_stress_around_a_hole():
     for size in (0.1, 0.05):
         grouped = st.mesh_shape(shape, size)
         mesh = grouped.mesh
-        springs = DEFINITIONS["delingette"].springs(mesh, material, 1.0)
+        springs = st.DEFINITIONS["delingette"].springs(mesh, material, 1.0)
         directions = np.zeros(mesh.points.shape, dtype=bool)
         directions[np.concatenate([edges for side, edges in grouped.sides.items() if side != "hole"])] = True
         exact, stress = others.kirsch(mesh.points, 1.0, 1.0, material)
@@ -305,11 +294,11 @@ class TestStress:
     def test_an_even_strain_has_an_even_stress(self, seed, linear):
         """On any mesh, of linear triangles: to rounding, at cells and at all particles."""
         random = np.random.default_rng(seed)
-        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
+        mesh = st.MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
         nudged = mesh.points + 1e-3 * random.uniform(-1, 1, mesh.points.shape)
         mesh = st.Mesh(nudged, mesh.triangles)
         gradient = 1e-3 * random.standard_normal((2, 2))
-        springs = DEFINITIONS["delingette"].springs(mesh, STEEL, 1e-3)
+        springs = st.DEFINITIONS["delingette"].springs(mesh, STEEL, 1e-3)
         network = free_network(mesh, springs)
         found = cell_stresses(network, mesh.points @ gradient.T, linear)
         strain = 0.5 * (gradient + gradient.T)
@@ -328,7 +317,7 @@ class TestStress:
 
     def test_parts_are_recovered_apart(self):
         """Stress that jumps from one part to the next is constant in either."""
-        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 6e-3)
+        mesh = st.MESH_TYPES["free"](LENGTH, HEIGHT, 6e-3)
         left = mesh.points[mesh.triangles].mean(axis=1)[:, 0] < 0.5 * LENGTH
         jump = {3: np.where(left[:, None], [1.0, 2.0, 3.0], [5.0, 0.0, -1.0])}
         for part, value in ((left, [1.0, 2.0, 3.0]), (~left, [5.0, 0.0, -1.0])):
@@ -342,9 +331,9 @@ class TestQuantities:
     @settings(max_examples=30, deadline=None)
     @given(some.floats(0, 1), some.floats(0, 1), some.sampled_from(["free", "braced", "right"]))
     def test_points_are_interpolated(self, along, across, mesh_type):
-        mesh = MESH_TYPES[mesh_type](LENGTH, HEIGHT, 9e-3)
+        mesh = st.MESH_TYPES[mesh_type](LENGTH, HEIGHT, 9e-3)
         point = np.array([along * LENGTH, across * HEIGHT])
-        grouped = GroupedMesh(mesh, points={"here": point})
+        grouped = st.GroupedMesh(mesh, points={"here": point})
         count, cell, shares = cell_at(grouped, "here")
         assert shares.sum() == pytest.approx(1, rel=1e-9)
         np.testing.assert_allclose(shares @ mesh.points[mesh.cells[count][cell]], point, atol=1e-9 * LENGTH)
@@ -352,11 +341,11 @@ class TestQuantities:
 
     def test_a_mean_is_by_length(self):
         """Of a field that is linear along a side whose edges differ."""
-        mesh = MESH_TYPES["right"](LENGTH, HEIGHT, 9e-3)
+        mesh = st.MESH_TYPES["right"](LENGTH, HEIGHT, 9e-3)
         points = mesh.points.copy()
         points[:, 1] = points[:, 1] ** 2 / HEIGHT
         mesh = st.Mesh(points, mesh.triangles)
-        grouped = GroupedMesh(mesh, {"right": mesh.outline_edges(0, LENGTH)})
+        grouped = st.GroupedMesh(mesh, {"right": mesh.outline_edges(0, LENGTH)})
         field = displacement_weights(grouped, END)
         assert (field[:, 0] * points[:, 1]).sum() == pytest.approx(HEIGHT / 2, rel=1e-9)
 
@@ -364,12 +353,12 @@ class TestQuantities:
 class TestMaterials:
     def bar(self, mesh_type="right"):
         """Two halves, one beyond the other, with sides and points."""
-        mesh = MESH_TYPES[mesh_type](LENGTH, HEIGHT, 1e-2)
+        mesh = st.MESH_TYPES[mesh_type](LENGTH, HEIGHT, 1e-2)
         sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
         sides["lower"] = mesh.outline_edges(1, 0.0)
         far = {3: mesh.points[mesh.triangles].mean(axis=1)[:, 0] > LENGTH / 2}
         points = {"near": np.array([0.02, 0.02]), "far": np.array([0.08, 0.02])}
-        return GroupedMesh(mesh, sides, points, {"far": far})
+        return st.GroupedMesh(mesh, sides, points, {"far": far})
 
     def test_a_bar_of_two(self):
         """In series, without lateral strain: exact, as is the stress on either side of where they meet."""
@@ -401,10 +390,7 @@ class TestAgainstReferences:
     """A plate with a hole: what networks come to, and their errors."""
 
     pull = load(
-        END,
-        st.Quantity("force", "reaction", "left", "x"),
-        supports=CLAMP,
-        tractions=[st.Traction("right", (4e3, 0.0))],
+        END, st.Quantity("force", "reaction", "left", "x"), supports=CLAMP, tractions=[st.Traction("right", (4e3, 0.0))]
     )
     shape = plate(pull, holes=[st.Hole.circle((0.05, 0.02), 0.008)])
     grouped = st.mesh_shape(shape, 3e-3)
@@ -426,7 +412,7 @@ class TestAgainstReferences:
         scene = st.Scene(self.shape, st.mesh_shape(self.shape, 8e-3), THIRD, "pull", definition="annealed",
                          kinematics="linear")  # fmt: skip
         plain = st.Scene(self.shape, scene.grouped, THIRD, "pull", definition="lattice", kinematics="linear")
-        assert DEFINITIONS["annealed"].needs == "cases"
+        assert st.DEFINITIONS["annealed"].needs == "cases"
         assert abs(scene.solve().error) < 0.7 * abs(plain.solve().error)
 
 
@@ -438,7 +424,7 @@ def test_a_shape_buckles_and_moves_as_the_beam_does():
     shape = st.Shape.rectangle(LENGTH, 4e-3, loads={"pull": press})
     sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
     column = st.Scene(beam, mesh, STEEL, "compression", 100.0, definition="delingette")
-    other = st.Scene(shape, GroupedMesh(mesh, sides), STEEL, "pull", definition="delingette")
+    other = st.Scene(shape, st.GroupedMesh(mesh, sides), STEEL, "pull", definition="delingette")
     with pytest.warns(AssumptionWarning, match="nothing bifurcates"):  # squares with one diagonal are no mirror image
         # An eigenvalue of the difference of two tangents, which rounding leaves eight digits.
         assert other.buckling_load() == pytest.approx(column.buckling_load() / 100.0, rel=1e-8)

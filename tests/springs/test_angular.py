@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+import springtune as st
 from periodic import periodic_delaunay
 from springtune.mechanics.energies import AngleEnergy, BiquadraticEnergy
-from springtune.mesh import MESH_TYPES, lattice
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS, Springs
+from springtune.mesh import lattice
 from springtune.springs.ielsm import angle_moduli
 from springtune.springs.normal_shear import slip_form
 
@@ -54,8 +53,8 @@ def test_moduli_on_other_meshes_are_within_a_band(name, mesh_type, band, nu):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_rotation_meets_no_resistance(name):
-    mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
-    network = free_network(mesh, DEFINITIONS[name].springs(mesh, Material(1.0, 0.2), 1.0))
+    mesh = st.MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
+    network = free_network(mesh, st.DEFINITIONS[name].springs(mesh, st.Material(1.0, 0.2), 1.0))
     resisted = np.abs(network.forces(1e-3 * mesh.points)).max()  # a stretch of a thousandth
     for angle in (1e-6, 0.3, 2.0):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -96,15 +95,15 @@ def test_any_part_of_the_area_constraint_may_be_shear_springs(nu, part):
     cotangents = (a * b).sum(axis=2) / (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
     form = slip_form(mesh, slip * cotangents)
     slips = BiquadraticEnergy(mesh.points, mesh.triangles, form[:, [0, 1, 2], [0, 1, 2]], form[:, [1, 2, 0], [2, 0, 1]])
-    mine = Springs(1.0, mesh.sum_to_edges({3: bulk * cotangents}), (angles, slips))
-    theirs = DEFINITIONS["delingette"].springs(mesh, Material(1.0, nu), 1.0)
+    mine = st.Springs(1.0, mesh.sum_to_edges({3: bulk * cotangents}), (angles, slips))
+    theirs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1.0, nu), 1.0)
     tangents = [one.reference * free_network(mesh, one).tangent().toarray() for one in (mine, theirs)]
     assert np.abs(tangents[0] - tangents[1]).max() < 1e-9 * np.abs(tangents[1]).max()
 
 
 def test_on_the_lattice_rotational_springs_are_those_of_angular_and_with_shear_springs_there_are_none():
     mesh, nu = lattice(6, 4, 2e-3), 0.2
-    mine, theirs = (DEFINITIONS[name].springs(mesh, Material(1.0, nu), 1.0) for name in ("ielsm", "angular"))
+    mine, theirs = (st.DEFINITIONS[name].springs(mesh, st.Material(1.0, nu), 1.0) for name in ("ielsm", "angular"))
     assert mine.reference == pytest.approx(theirs.reference, rel=1e-9)
     np.testing.assert_allclose(mine.relative, theirs.relative, rtol=1e-9)
     np.testing.assert_allclose(
@@ -118,14 +117,14 @@ def test_on_the_lattice_rotational_springs_are_those_of_angular_and_with_shear_s
 def test_sides_opposite_right_angles_have_no_axial_spring():
     """Rounding of cot 90 degrees is no spring; the diagonals' are left out of files."""
     mesh = patch("right")
-    springs = DEFINITIONS["ielsm"].springs(mesh, Material(1.0, 0.3), 1.0)
+    springs = st.DEFINITIONS["ielsm"].springs(mesh, st.Material(1.0, 0.3), 1.0)
     diagonal = mesh.edge_lengths > 1.2 * mesh.edge_lengths.min()
     assert (springs.relative[diagonal] == 0).all() and (springs.relative[~diagonal] > 0.5 * 3**0.5 / 2).all()
 
 
 def test_delaunay_triangles_have_no_negative_axial_spring_inside():
     mesh, copied = some_triangles()
-    springs = DEFINITIONS["ielsm"].springs(mesh, Material(1.0, 0.3), 1.0)
+    springs = st.DEFINITIONS["ielsm"].springs(mesh, st.Material(1.0, 0.3), 1.0)
     ends = np.sort(copied[mesh.edges], axis=1) @ [len(mesh.points), 1]
     _, pairs = np.unique(ends, return_inverse=True)
     assert springs.relative.min() < 0 < np.bincount(pairs, springs.relative).min()  # with its copy across the outline
@@ -175,4 +174,4 @@ def test_lammps_volume_factor_has_the_moduli_that_it_is_given(nu, edge):
         lammps_stress(ends[once], vectors[once], len(points), mesh.area, k, factor, strain) / size for strain in strains
     ]
     stiffness = np.array([[one[0, 0], one[1, 1], one[0, 1]] for one in stresses])
-    np.testing.assert_allclose(stiffness, Material(1.0, nu).plane_stress, atol=2e-5)  # of second order in the strain
+    np.testing.assert_allclose(stiffness, st.Material(1.0, nu).plane_stress, atol=2e-5)  # of second order in the strain

@@ -9,7 +9,6 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.mesh import lattice
-from springtune.springs import DEFINITIONS
 from springtune.springs.best_springs import DISPLACEMENT_WEIGHT, STRETCH_WEIGHT, LoadSpace
 
 THIRD = st.Material("1 MPa", 1 / 3, name="third")
@@ -131,7 +130,7 @@ def test_no_springs_are_below_the_bound(seed, size, nu, holed):
 
 @pytest.mark.parametrize("name", ["lattice", "van-gelder", "energy-fit", "patch-fit", "best-springs"])
 def test_no_definition_is_below_the_bound(name):
-    springs = DEFINITIONS[name].springs(space().mesh, THIRD.in_plane, 1.0)
+    springs = st.DEFINITIONS[name].springs(space().mesh, THIRD.in_plane, 1.0)
     stiffness = springs.relative * springs.reference / THIRD.young_modulus
     assert space().errors(stiffness)[2] > bound(1 / 3, False)
 
@@ -150,7 +149,7 @@ def test_the_bound_is_zero_where_springs_can_be_exact():
 
 
 def test_a_study_can_name_it():
-    springs = DEFINITIONS["best-springs"].springs(space().mesh, THIRD, 1.0)
+    springs = st.DEFINITIONS["best-springs"].springs(space().mesh, THIRD, 1.0)
     assert springs.evaluations > 10 and springs.relative.min() > 0
 
 

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 import yaml
 from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 from scipy.optimize import nnls
 
+import springtune as st
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, Mesh, lattice
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material, Rubber
-from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.mesh import lattice
 from springtune.springs.element_fit import least_squares
 from springtune.springs.lattice import predicted_stiffness
 
@@ -53,7 +51,7 @@ def test_springs_alone_on_the_lattice(name, nu):
 
 def even_tension(name, mesh):
     """Stiffness against even tension over that of a sheet with nu = 1/3, E / (1 - nu)."""
-    springs = DEFINITIONS[name].springs(mesh, Material(1.0, 1 / 3), 1.0)
+    springs = st.DEFINITIONS[name].springs(mesh, st.Material(1.0, 1 / 3), 1.0)
     return 0.5 * PatchTest(mesh).stiffness(springs)[:2, :2].sum() * springs.reference * (1 - 1 / 3)
 
 
@@ -61,17 +59,17 @@ MECHANISMS = ("cross-section", "right"), ("cross-section", "alternating"), ("for
 """Definitions that leave springs opposite right angles without stiffness."""
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_a_definition_that_leaves_a_mechanism_refuses_the_mesh(mesh_type):
     """All others have three motions without resistance, clearly apart; rounding decides nothing."""
-    mesh = MESH_TYPES[mesh_type](0.06, 0.02, 0.005)
-    for one in DEFINITIONS.values():
+    mesh = st.MESH_TYPES[mesh_type](0.06, 0.02, 0.005)
+    for one in st.DEFINITIONS.values():
         for placed in (mesh, disturbed(mesh, 2.0, 50.0)):
             if one.needs == "cases" or one.name in ("adjoint", "neo-hooke", "yeoh", "axis-exact"):
                 continue
             try:
-                springs = one.springs(placed, Material(1e6, 0.3), 1e-3, 1e3 if one.needs else None)
-            except DefinitionError as error:
+                springs = one.springs(placed, st.Material(1e6, 0.3), 1e-3, 1e3 if one.needs else None)
+            except st.DefinitionError as error:
                 wanted = "gives .* springs no stiffness, and without them .* meet no resistance; use a mesh without"
                 assert bool(re.search(wanted, str(error))) == ((one.name, mesh_type) in MECHANISMS)
                 continue
@@ -94,7 +92,7 @@ def test_even_tension_is_known_on_any_triangles(name, share, mesh_type):
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 def test_areas_are_those_of_red_cells(nu):
     """G = sqrt(3)/4 k, K = sqrt(3)/2 k + k_d and E = 4 K G / (K + G) of bonds and areas (Fedosov 2010)."""
-    springs = DEFINITIONS["area"].springs(patch("structured"), Material(1.0, nu), 1.0)
+    springs = st.DEFINITIONS["area"].springs(patch("structured"), st.Material(1.0, nu), 1.0)
     bond, of_area = springs.reference, springs.reference * springs.energies[0].modulus[0]
     shear, bulk = np.sqrt(3) / 4 * bond, np.sqrt(3) / 2 * bond + of_area
     assert shear == pytest.approx(1 / (2 * (1 + nu)), rel=1e-9)
@@ -117,17 +115,17 @@ def test_any_poisson_ratio_is_exact(name, mesh_type, nu):
 
 
 @pytest.mark.parametrize(
-    "name", sorted({name for name, one in DEFINITIONS.items() if one.needs != "cases"} - {"adjoint"})
+    "name", sorted({name for name, one in st.DEFINITIONS.items() if one.needs != "cases"} - {"adjoint"})
 )
 @pytest.mark.parametrize("factor", [2.0**-12, 2.0**12])
 def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
     """In the plane no length enters E t; powers of two round nothing."""
-    law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 1 / 3, name="unit")
-    mesh = MESH_TYPES["structured" if 3 in DEFINITIONS[name].cells else "braced"](0.03, 0.01, 2.5e-3)
+    law = st.Rubber((1 / 6,)) if name == "yeoh" else st.Material(1.0, 1 / 3, name="unit")
+    mesh = st.MESH_TYPES["structured" if 3 in st.DEFINITIONS[name].cells else "braced"](0.03, 0.01, 2.5e-3)
     if name == "axis-exact":
-        mesh = MESH_TYPES["braced"](0.03, 0.01, 2.5e-3)
+        mesh = st.MESH_TYPES["braced"](0.03, 0.01, 2.5e-3)
     one, other = (
-        DEFINITIONS[name].springs(Mesh(size * mesh.points, mesh.triangles, mesh.quads), law, 1.0, 1.0)
+        st.DEFINITIONS[name].springs(st.Mesh(size * mesh.points, mesh.triangles, mesh.quads), law, 1.0, 1.0)
         for size in (1.0, factor)
     )
     assert other.reference == pytest.approx(one.reference, rel=1e-9)
@@ -141,19 +139,19 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
 @pytest.mark.parametrize("name", ["delingette", "delingette-tensile"])
 def test_delingettes_springs_are_those_of_the_lattice_where_nothing_couples(name):
     """At nu = 1/3 on equilateral triangles; 2 L^2 k are spring constants at rest."""
-    mesh, material = patch("structured"), Material(3.0, 1 / 3, name="any")
-    ours, theirs = (DEFINITIONS[one].springs(mesh, material, 2.0) for one in (name, "lattice"))
+    mesh, material = patch("structured"), st.Material(3.0, 1 / 3, name="any")
+    ours, theirs = (st.DEFINITIONS[one].springs(mesh, material, 2.0) for one in (name, "lattice"))
     np.testing.assert_allclose(ours.reference * ours.linear_springs, theirs.reference * theirs.relative, rtol=1e-9)
 
 
 def test_definitions_are_what_they_are_declared_to_be():
     """One stiffness, a stress across the load, the law at finite strain: asked of the springs themselves."""
     uniform, lateral, lawful = set(), set(), set()
-    for name, one in DEFINITIONS.items():
+    for name, one in st.DEFINITIONS.items():
         if one.needs == "cases":
             continue
-        mesh = MESH_TYPES["braced" if 4 in one.cells else "free"](0.03, 0.01, 2.5e-3)
-        law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 0.3, name="unit")
+        mesh = st.MESH_TYPES["braced" if 4 in one.cells else "free"](0.03, 0.01, 2.5e-3)
+        law = st.Rubber((1 / 6,)) if name == "yeoh" else st.Material(1.0, 0.3, name="unit")
         found = one.springs(mesh, law, 1.0, 1.0)
         if not found.energies and np.ptp(found.relative) == 0:
             uniform.add(name)
@@ -162,18 +160,18 @@ def test_definitions_are_what_they_are_declared_to_be():
         # Of all, a law of rubber alone has no energy inside out.
         if any(not np.isfinite(energy.value(-2.0 * mesh.points * [1, 0])) for energy in found.energies):
             lawful.add(name)
-    asked = {name: one for name, one in DEFINITIONS.items() if one.needs != "cases"}
+    asked = {name: one for name, one in st.DEFINITIONS.items() if one.needs != "cases"}
     assert uniform == {name for name, one in asked.items() if one.uniform}
     assert lateral == {name for name, one in asked.items() if one.uniaxial}
     assert lawful == {name for name, one in asked.items() if one.finite_strain}
 
 
 @settings(max_examples=15)
-@given(nu=st.floats(0, 0.5), shape=st.floats(0.75, 1.33))
+@given(nu=some.floats(0, 0.5), shape=some.floats(0.75, 1.33))
 def test_rectangles(nu, shape):
     columns = 12
-    mesh = MESH_TYPES["braced"](columns * shape * SIZE, HEIGHT, SIZE)
-    stretched = Mesh(mesh.points * [columns * shape * SIZE / mesh.points[:, 0].max(), 1], mesh.triangles, mesh.quads)
+    mesh = st.MESH_TYPES["braced"](columns * shape * SIZE, HEIGHT, SIZE)
+    stretched = st.Mesh(mesh.points * [columns * shape * SIZE / mesh.points[:, 0].max(), 1], mesh.triangles, mesh.quads)
     for name in ("area", "baudet-corrected"):
         young, ratio, shear = errors(name, stretched, nu)
         assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
@@ -208,7 +206,7 @@ def test_free_meshes_are_a_few_percent_off(name):
 
 
 @settings(max_examples=30)
-@given(seed=st.integers(0, 2**31), springs=st.integers(1, 6))
+@given(seed=some.integers(0, 2**31), springs=some.integers(1, 6))
 def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
     generator = np.random.default_rng(seed)
     columns, goals = generator.standard_normal((20, 7, springs)), generator.standard_normal((20, 7))
@@ -225,8 +223,8 @@ def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
 
 def slender(ratio, turn=((1, 0), (0, 1))):
     """Squares with both diagonals made longer along x, and turned."""
-    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
-    return Mesh(mesh.points * [ratio, 1] @ turn, mesh.triangles, mesh.quads)
+    mesh = st.MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    return st.Mesh(mesh.points * [ratio, 1] @ turn, mesh.triangles, mesh.quads)
 
 
 @pytest.mark.parametrize(
@@ -235,11 +233,11 @@ def slender(ratio, turn=((1, 0), (0, 1))):
         *(
             (
                 name,
-                MESH_TYPES["braced" if one.cells == (3,) else "structured"](0.03, 0.01, 2e-3),
+                st.MESH_TYPES["braced" if one.cells == (3,) else "structured"](0.03, 0.01, 2e-3),
                 0.3,
                 "needs (triangles|rectangles).*mesh type",
             )
-            for name, one in DEFINITIONS.items()
+            for name, one in st.DEFINITIONS.items()
             if one.cells != (3, 4)
         ),
         *((name, slender(2.5), 0.3, "negative stiffness") for name in ("baudet", "flechon", "lattice", "axis-exact")),
@@ -247,29 +245,24 @@ def slender(ratio, turn=((1, 0), (0, 1))):
         *(("lloyd", slender(ratio), 0.3, "needs squares") for ratio in (1.025, 0.975)),
         ("axis-exact", slender(1, [[0.8, 0.6], [-0.6, 0.8]]), 0.3, "sides along x and y"),
         ("axis-exact", patch("braced"), 0.0, "above 0"),
-        ("axis-exact", MESH_TYPES["free"](0.03, 0.01, 2e-3), 0.3, "isosceles"),
-        (
-            "axis-exact",
-            lattice(5, 4, 1e-3),
-            0.49,
-            r"nu = 0.333 and the material 0.49; use rows of height 0.7143 mm",
-        ),
+        ("axis-exact", st.MESH_TYPES["free"](0.03, 0.01, 2e-3), 0.3, "isosceles"),
+        ("axis-exact", lattice(5, 4, 1e-3), 0.49, r"nu = 0.333 and the material 0.49; use rows of height 0.7143 mm"),
         ("van-gelder-general", lattice(6, 4, row_height=0.3), 0.5, "negative stiffness.*obtuse"),
     ],
 )
 def test_meshes_that_a_definition_cannot_have_are_refused(name, mesh, nu, message):
-    with pytest.raises(DefinitionError, match=message):
-        DEFINITIONS[name].springs(mesh, Material(1.0, nu, name="unit"), 1.0)
+    with pytest.raises(st.DefinitionError, match=message):
+        st.DEFINITIONS[name].springs(mesh, st.Material(1.0, nu, name="unit"), 1.0)
 
 
 def test_lloyds_squares_may_be_off_by_two_percent():
-    assert DEFINITIONS["lloyd"].springs(slender(1.015), Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
+    assert st.DEFINITIONS["lloyd"].springs(slender(1.015), st.Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
 
 
 @pytest.mark.parametrize("name", ["lattice", "patch", "patch-fit", "element-fit", "energy-fit", "area", "delingette"])
 def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
-    mesh, steel = MESH_TYPES["structured"](0.03, 0.01, 2.5e-3), Material(210e9, 0.3, name="steel")
-    thin, thick = (DEFINITIONS[name].springs(mesh, steel, thickness) for thickness in (1e-3, 3e-3))
+    mesh, steel = st.MESH_TYPES["structured"](0.03, 0.01, 2.5e-3), st.Material(210e9, 0.3, name="steel")
+    thin, thick = (st.DEFINITIONS[name].springs(mesh, steel, thickness) for thickness in (1e-3, 3e-3))
     # The product is rounded twice.
     np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-9)
 
@@ -281,8 +274,8 @@ def test_quadrilaterals_that_are_no_rectangles_are_refused(corner):
     quads = np.array([[0, 1, 2, 3]])
     moved = square + [[0, 0], [0, 0], corner, [0, 0]]
     for points in (moved, sheared, np.array([[0, 0], [1, 0], [0.8, 1], [0.2, 1.0]])):
-        with pytest.raises(DefinitionError, match="needs rectangles and the mesh has other quadrilaterals"):
-            DEFINITIONS["baudet"].springs(Mesh(points, np.zeros((0, 3), int), quads), Material(1.0, 0.3), 1.0)
+        with pytest.raises(st.DefinitionError, match="needs rectangles and the mesh has other quadrilaterals"):
+            st.DEFINITIONS["baudet"].springs(st.Mesh(points, np.zeros((0, 3), int), quads), st.Material(1.0, 0.3), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -290,16 +283,16 @@ def test_quadrilaterals_that_are_no_rectangles_are_refused(corner):
 )
 def test_sides_without_stiffness_are_not_refused_by_rounding(name, nu, ratio):
     """In whatever unit: before, rounding of the coordinates decided which of these meshes are taken."""
-    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    mesh = st.MESH_TYPES["braced"](0.04, 0.01, 2e-3)
     for factor in np.random.default_rng(1).uniform(0.1, 10, 20):
-        scaled = Mesh(mesh.points * [ratio * factor, factor], mesh.triangles, mesh.quads)
-        made = DEFINITIONS[name].springs(scaled, Material(1.0, nu, name="unit"), 1.0)
+        scaled = st.Mesh(mesh.points * [ratio * factor, factor], mesh.triangles, mesh.quads)
+        made = st.DEFINITIONS[name].springs(scaled, st.Material(1.0, nu, name="unit"), 1.0)
         assert (made.relative == 0).sum() == 20 * 6  # the edges along x
 
 
 @pytest.mark.parametrize(("load", "excess"), [("traction", 1), ("compression", 1), ("bending", 3)])
 def test_predicted_stiffness_is_that_of_the_lattice_less_the_full_outlines(load, excess):
-    beam, material = Beam(0.2, 0.04, 1e-3, "200x40"), Material(3e9, 0.3, name="any")
+    beam, material = st.Beam(0.2, 0.04, 1e-3, "200x40"), st.Material(3e9, 0.3, name="any")
     inside = np.sqrt(3) / 2 * 3e9 * 1e-3
     expected = inside / (1 + excess * np.sqrt(3) / 2 * 5e-3 / 0.04)
     assert predicted_stiffness(material, beam, 5e-3, load) == pytest.approx(expected, rel=1e-9)

@@ -10,22 +10,15 @@ from hypothesis import strategies as some
 
 import shapes_of_others as others
 import springtune as st
-from springtune.mechanics.moduli import (
-    PatchTest,
-    isotropic_moduli,
-    strip_fault,
-)
+from springtune.mechanics.moduli import PatchTest, isotropic_moduli, strip_fault
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
+from springtune.mesh import lattice, signed_areas
 from springtune.springs.patch_fit import TESTS, outline_tests
 
 from problems import free_network
 
-UNIT = Material(1.0, 1 / 3, name="unit")
-BEAMS = tuple(Beam(*sides) for sides in ((0.2, 0.04), (0.2, 0.03), (0.13, 0.02), (0.11, 0.025), (0.1, 0.02)))
+UNIT = st.Material(1.0, 1 / 3, name="unit")
+BEAMS = tuple(st.Beam(*sides) for sides in ((0.2, 0.04), (0.2, 0.03), (0.13, 0.02), (0.11, 0.025), (0.1, 0.02)))
 
 
 # -- shapes ------------------------------------------------------------------------------------------------------------
@@ -74,7 +67,7 @@ def error(name, size, definition):
 @given(nu=some.floats(0, 0.5), name=some.sampled_from(list(SHAPES)))
 def test_outline_tests_are_exact_for_linear_triangles(nu, name):
     mesh = shape(name, 6)
-    found = DEFINITIONS["delingette"].springs(mesh, Material(1.0, nu, name="unit"), 1.0)
+    found = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1.0, nu, name="unit"), 1.0)
     sheet = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
     assert PatchTest(mesh).stiffness(found) * found.reference == pytest.approx(sheet, abs=1e-9)
     assert isotropic_moduli(np.linalg.inv(sheet)) == pytest.approx((1, nu), abs=1e-9)
@@ -85,7 +78,7 @@ def test_outline_tests_are_exact_for_linear_triangles(nu, name):
 def test_patch_makes_young_modulus_exact_on_any_outline(name, definition):
     mesh = shape(name, 4)
     assert strip_fault(mesh)
-    found = DEFINITIONS[definition].springs(mesh, UNIT, 1.0)
+    found = st.DEFINITIONS[definition].springs(mesh, UNIT, 1.0)
     assert PatchTest(mesh).axial(found)[0] * found.reference == pytest.approx(1, abs=1e-9)
 
 
@@ -94,8 +87,8 @@ def test_patch_makes_young_modulus_exact_on_any_outline(name, definition):
 def test_springs_turn_with_the_mesh(angle, scale, definition):
     mesh = shape("cook", 6)
     turn = scale * np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    turned = Mesh(mesh.points @ turn + [3, -7], mesh.triangles)
-    first, second = (DEFINITIONS[definition].springs(one, UNIT, 1.0) for one in (mesh, turned))
+    turned = st.Mesh(mesh.points @ turn + [3, -7], mesh.triangles)
+    first, second = (st.DEFINITIONS[definition].springs(one, UNIT, 1.0) for one in (mesh, turned))
     assert second.reference * second.relative == pytest.approx(first.reference * first.relative, rel=1e-9)
 
 
@@ -106,7 +99,7 @@ def scattered(beam, size, seed):
     """Delaunay triangles of a free mesh's points, all inside moved by up to a quarter of an edge."""
     from scipy.spatial import Delaunay
 
-    made = MESH_TYPES["free"](beam.length, beam.height, size)
+    made = st.MESH_TYPES["free"](beam.length, beam.height, size)
     inside = np.ones(len(made.points), dtype=bool)
     inside[made.edges[made.on_outline]] = False
     points = made.points.copy()
@@ -114,13 +107,13 @@ def scattered(beam, size, seed):
     triangles = Delaunay(points).simplices
     areas = signed_areas(points, triangles)
     triangles[areas < 0] = triangles[areas < 0][:, ::-1]
-    return Mesh(points, triangles[np.abs(areas) > 1e-9 * size**2])
+    return st.Mesh(points, triangles[np.abs(areas) > 1e-9 * size**2])
 
 
 @cache
 def beam_error(name, beam, seed, load):
     """Error under a load, of a free mesh of 5 mm or of scattered points."""
-    mesh = MESH_TYPES["free"](beam.length, beam.height, 5e-3) if seed is None else scattered(beam, 5e-3, seed)
+    mesh = st.MESH_TYPES["free"](beam.length, beam.height, 5e-3) if seed is None else scattered(beam, 5e-3, seed)
     return st.Scene(beam, mesh, UNIT, load, 1e-3, definition=name, kinematics="linear").solve().error
 
 
@@ -155,7 +148,7 @@ def test_shapes_of_two_thousand_particles(name, size, bound):
 @given(seed=some.integers(0, 1000))
 def test_springs_are_above_zero_and_stable(seed):
     mesh = scattered(BEAMS[-1], 5e-3, seed)
-    found = DEFINITIONS["patch-fit"].springs(mesh, UNIT, 1.0)
+    found = st.DEFINITIONS["patch-fit"].springs(mesh, UNIT, 1.0)
     assert found.relative.min() > 0 and found.spring_ratio < 100 and 1 <= found.evaluations <= 4
     matrix = free_network(mesh, found).tangent().toarray()
     values = np.linalg.eigvalsh(matrix)
@@ -171,7 +164,7 @@ def test_forces_of_the_tests_balance_and_linear_triangles_converge_to_them():
         assert len(forces) == TESTS and np.abs(forces.sum(axis=1)).max() < 1e-9 * np.abs(forces).max()
         x, y = mesh.points.T
         assert np.abs(forces[..., 1] @ x - forces[..., 0] @ y).max() < 1e-9 * np.abs(forces).max() * np.ptp(mesh.points)
-        springs = DEFINITIONS["delingette"].springs(mesh, UNIT, 1.0)
+        springs = st.DEFINITIONS["delingette"].springs(mesh, UNIT, 1.0)
         held = np.zeros(mesh.points.shape, dtype=bool)
         held[0], held[1, 1] = True, True
         network = Network(mesh, held, springs.relative, springs.energies)
@@ -185,7 +178,7 @@ def test_the_lattice_is_kept_but_for_the_square_of_the_mesh_size():
     misses, rows = [], (8, 16, 32)
     for count in rows:
         mesh = lattice(2 * count, count)
-        found = DEFINITIONS["patch-fit"].springs(mesh, UNIT, 1.0)
+        found = st.DEFINITIONS["patch-fit"].springs(mesh, UNIT, 1.0)
         young_modulus, poisson_ratio = PatchTest(mesh).axial(found)
         moduli = (
             young_modulus * found.reference,
@@ -203,6 +196,6 @@ def test_rows_fix_what_shear_is_to_stiffness_across_them(row_height, row, diagon
     """Cauchy's relation cell by cell: C2222 / C1212 = (2 h / a)^2, whatever the springs; 4 at h = a, 3 if isotropic."""
     mesh = lattice(8, 6, row_height=row_height)
     level = mesh.points[mesh.edges[:, 0], 1] == mesh.points[mesh.edges[:, 1], 1]
-    springs = DEFINITIONS["lattice"].springs(mesh, UNIT, 1.0)
+    springs = st.DEFINITIONS["lattice"].springs(mesh, UNIT, 1.0)
     stiffness = PatchTest(mesh).stiffness(replace(springs, relative=springs.relative * np.where(level, row, diagonal)))
     assert stiffness[1, 1] / stiffness[2, 2] == pytest.approx(4 * row_height**2, rel=1e-9)

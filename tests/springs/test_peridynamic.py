@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+import springtune as st
 from springtune.mechanics.moduli import PatchTest
-from springtune.mesh import MESH_TYPES, Mesh, MeshError, lattice, write_mesh
+from springtune.mesh import lattice, write_mesh
 from springtune.mesh.sheets import bonded
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
 
 from patches import disturbed, patch
 
@@ -19,7 +18,7 @@ def test_bonds_of_peridynamics_have_the_energy_of_a_sheet(mesh_type, shells):
     mesh = patch(mesh_type)
     if shells:
         mesh = bonded(mesh, (shells + 0.01) * mesh.edge_lengths.min())
-    springs = DEFINITIONS["peridynamic"].springs(mesh, Material(1.0, 1 / 3), 1.0)
+    springs = st.DEFINITIONS["peridynamic"].springs(mesh, st.Material(1.0, 1 / 3), 1.0)
     total = (springs.relative * springs.reference * mesh.edge_lengths**2).sum()
     assert total == pytest.approx(3 * mesh.area, rel=1e-9) and (springs.relative > 0).all()
 
@@ -28,10 +27,10 @@ def test_bonds_of_peridynamics_have_the_energy_of_a_sheet(mesh_type, shells):
 @pytest.mark.parametrize("shells", [2, 3])
 def test_bonds_do_not_depend_on_the_place_of_a_mesh(mesh_type, shells):
     """Around a notch, whose sides and corner bonds touch in particles."""
-    mesh = MESH_TYPES[mesh_type](0.05, 0.03, 0.005)
+    mesh = st.MESH_TYPES[mesh_type](0.05, 0.03, 0.005)
     x, y = mesh.points[mesh.triangles].mean(axis=1).T
     used, corners = np.unique(mesh.triangles[(x < 0.025) | (y < 0.015)], return_inverse=True)
-    mesh = Mesh(mesh.points[used], corners.reshape(-1, 3))
+    mesh = st.Mesh(mesh.points[used], corners.reshape(-1, 3))
     found = set()
     for turn in (0.0, 0.1, 1.0, np.pi / 2, 3.0):
         for size in (1.0, 1e-3, 1e3):
@@ -44,7 +43,7 @@ def test_peridynamics_inside_a_sheet():
     """Far from the outline a sheet of two shells has E and nu = 1/3; near it bonds are cut, and E and G miss some."""
     mesh = lattice(60, 40, 1.0)
     joined = bonded(mesh, 2.01)
-    springs = DEFINITIONS["peridynamic"].springs(joined, Material(1.0, 1 / 3), 1.0)
+    springs = st.DEFINITIONS["peridynamic"].springs(joined, st.Material(1.0, 1 / 3), 1.0)
     middle = np.argmin(((mesh.points - mesh.points.mean(axis=0)) ** 2).sum(axis=1))
     here = (joined.edges == middle).any(axis=1)
     assert here.sum() == 18  # 6 neighbours, 6 at sqrt(3), 6 at 2
@@ -62,12 +61,12 @@ def test_bonds_do_not_cross_what_is_no_body():
     points = np.array([[x, y] for y in range(4) for x in range(7)], dtype=float)
     quads = np.array([[i + 7 * j, i + 1 + 7 * j, i + 8 + 7 * j, i + 7 + 7 * j] for j in range(3) for i in range(6)])
     slot = (quads[:, 0] // 7 == 1) & (quads[:, 0] % 7 < 5)
-    mesh = bonded(Mesh(points, np.zeros((0, 3), dtype=int), quads[~slot]), 2.3)
+    mesh = bonded(st.Mesh(points, np.zeros((0, 3), dtype=int), quads[~slot]), 2.3)
     ends = points[mesh.edges]
     lips = (ends[:, :, 0] < 5).all(axis=1) & (ends[:, :, 1].min(axis=1) <= 1) & (ends[:, :, 1].max(axis=1) >= 2)
     assert not lips.any() and len(mesh.bonds)
     assert ((ends[:, :, 1] == 3).all(axis=1) & (np.ptp(ends[:, :, 0], axis=1) == 2)).sum() == 5  # along a side
     assert len(np.unique(mesh.edges, axis=0)) == len(mesh.edges)
     assert (mesh.cells_per_edge == 0).sum() == len(mesh.bonds)
-    with pytest.raises(MeshError, match="a mesh file has no place for"):
+    with pytest.raises(st.MeshError, match="a mesh file has no place for"):
         write_mesh("bonds.vtu", mesh)

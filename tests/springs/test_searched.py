@@ -3,17 +3,15 @@
 import numpy as np
 import pytest
 
+import springtune as st
 from springtune.mechanics.moduli import PatchTest
-from springtune.mesh import MESH_TYPES, Mesh
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.searched import adjoint
 
 
 def test_gradient_of_the_misfit_is_exact():
-    mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
-    material = Material(5.0, 0.45, name="any")
+    mesh = st.MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
+    material = st.Material(5.0, 0.45, name="any")
     misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
     generator = np.random.default_rng(1)
     here, direction = 0.3 * generator.standard_normal((2, len(mesh.edges)))
@@ -24,7 +22,7 @@ def test_gradient_of_the_misfit_is_exact():
 
 def test_a_network_that_does_not_move_misses_half_of_each_case():
     """J = 1/2 sum |u - u*|^2 / |u*|^2 at u = 0, which springs 1e12 times as stiff as asked come near to."""
-    mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material(5.0, 0.45, name="any")
+    mesh, material = st.MESH_TYPES["free"](0.03, 0.01, 2.5e-3), st.Material(5.0, 0.45, name="any")
     misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
     assert misfit(np.full(len(mesh.edges), np.log(1e12))) == pytest.approx(3 / 2, rel=1e-9)
     assert misfit.evaluations == 1
@@ -32,7 +30,7 @@ def test_a_network_that_does_not_move_misses_half_of_each_case():
 
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 def test_adjoint_reaches_poisson_ratios_that_springs_cannot(nu):
-    mesh, material = MESH_TYPES["free"](0.04, 0.0133, 2.5e-3), Material(1.0, nu, name="unit")
+    mesh, material = st.MESH_TYPES["free"](0.04, 0.0133, 2.5e-3), st.Material(1.0, nu, name="unit")
     springs = adjoint(mesh, material, 1.0)
     young, ratio = PatchTest(mesh).axial(springs)
     assert young * springs.reference == pytest.approx(1, abs=0.03)
@@ -44,9 +42,9 @@ def test_adjoint_reaches_poisson_ratios_that_springs_cannot(nu):
 
 @pytest.mark.parametrize("name", ["annealed", "evolved"])
 def test_searches_are_repeatable_and_better_than_their_start(name):
-    mesh, material = MESH_TYPES["free"](0.03, 0.01, 5e-3), Material(1.0, 0.45, name="unit")
+    mesh, material = st.MESH_TYPES["free"](0.03, 0.01, 5e-3), st.Material(1.0, 0.45, name="unit")
     cases = patch_cases(mesh, material, 1.0)
-    first, second = (DEFINITIONS[name].function(mesh, material, 1.0, cases, 200) for _ in "ab")
+    first, second = (st.DEFINITIONS[name].function(mesh, material, 1.0, cases, 200) for _ in "ab")
     assert (first.relative == second.relative).all()
     assert first.evaluations <= 200
     misfit = Misfit(mesh, material, 1.0, cases)
@@ -60,8 +58,8 @@ def test_rounding_does_not_choose_the_corner_that_is_held():
     triangles = np.array([[0, i + 1, (i + 1) % 12 + 1] for i in range(12)])
     held = {
         patch_cases(
-            Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
-            Material(1.0, 0.3, name="unit"),
+            st.Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
+            st.Material(1.0, 0.3, name="unit"),
             1.0,
         )[0].held.tobytes()
         for _ in range(20)

@@ -5,12 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
+import springtune as st
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
 
 FORMS = {
     "sine": lambda x: np.sin(np.pi * x),
@@ -43,9 +41,9 @@ class Arch:
 
     def parts(self):
         """Mesh, directions held, forces of total 1, displacements given, edges of the upper side (body to the left)."""
-        flat = MESH_TYPES[self.mesh_type](1.0, self.strip, self.strip / self.rows)
+        flat = st.MESH_TYPES[self.mesh_type](1.0, self.strip, self.strip / self.rows)
         x, y = flat.points.T
-        mesh = Mesh(
+        mesh = st.Mesh(
             flat.points + np.stack([0 * x, self.rise * self.strip * FORMS[self.form](x)], axis=1), flat.triangles
         )
         held = np.zeros(mesh.points.shape, dtype=bool)
@@ -69,8 +67,8 @@ class Arch:
 
     def springs(self, mesh):
         """Springs of its definition; a uniform stiffness is 0.85 E t."""
-        material = Material(self.young_modulus, self.poisson_ratio, name="arch")
-        definition = DEFINITIONS[self.definition]
+        material = st.Material(self.young_modulus, self.poisson_ratio, name="arch")
+        definition = st.DEFINITIONS[self.definition]
         return definition.springs(
             mesh, material, self.thickness, 0.85 * self.young_modulus if definition.needs else None
         )

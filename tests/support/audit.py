@@ -19,6 +19,7 @@ from functools import partial
 
 import numpy as np
 
+import springtune as st
 from arches import ENDS, Arch
 from mechanics import (
     LONG,
@@ -39,12 +40,8 @@ from mechanics import (
 )
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import FollowerPressure
-from springtune.mesh import MESH_TYPES
-from springtune.problem.geometry import AssumptionWarning, Beam
-from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
+from springtune.problem.geometry import AssumptionWarning
 from springtune.scene.mesh_cache import Loading, MeshCache, solve_and_judge
-from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.studies.kinds.bodies.solve import solve as solve_scene
 from springtune.studies.kinds.bodies.solve import solve_beam
 
@@ -88,21 +85,21 @@ class Scene:
 
     @property
     def material(self):
-        return Material(self.young_modulus, self.poisson_ratio, name="drawn")
+        return st.Material(self.young_modulus, self.poisson_ratio, name="drawn")
 
 
 def draw(seed, number, later=False):
     """Scene of a seed and a number, of a definition that is one of `LATER` or is not."""
     rng = np.random.default_rng([seed, number])
-    mesh_type = str(rng.choice([name for name in MESH_TYPES if not later or name != "braced"]))
+    mesh_type = str(rng.choice([name for name in st.MESH_TYPES if not later or name != "braced"]))
     corners = 4 if mesh_type == "braced" else 3
-    load = str(rng.choice(list(LOADS)))
-    kind = LOADS[load].kind.name
+    load = str(rng.choice(list(st.LOADS)))
+    kind = st.LOADS[load].kind.name
     names = [
         name
-        for name, definition in DEFINITIONS.items()
+        for name, definition in st.DEFINITIONS.items()
         if corners in definition.cells
-        and (LOADS[load].kind.uniaxial or not definition.uniaxial)
+        and (st.LOADS[load].kind.uniaxial or not definition.uniaxial)
         and definition.needs in ("", "stiffness")
         and name != "yeoh"  # of tested rubber alone
         and (name in LATER) == later
@@ -119,7 +116,7 @@ def draw(seed, number, later=False):
     ratio = 10 ** (rng.uniform(-1, 1) if kind == "face" else rng.uniform(0, math.log10(300)))
     length = ratio * height
     # All eigenvalues of a matrix that is not symmetric take long.
-    count = 30 * 10 ** rng.uniform(0, 0.7 if LOADS[load].follower else 1.1)
+    count = 30 * 10 ** rng.uniform(0, 0.7 if st.LOADS[load].follower else 1.1)
     slender = max(ratio, 1 / ratio)
     rows = max(math.sqrt(count / slender), 2, min(int(rng.integers(2, 5)), math.sqrt(1500 / slender)))
     size = float(min(length, height) / rows)
@@ -160,7 +157,7 @@ def draw_snap(seed, number, later=False):
         load = "shortening"
     names = [
         name
-        for name, definition in DEFINITIONS.items()
+        for name, definition in st.DEFINITIONS.items()
         if 3 in definition.cells
         and not definition.uniaxial
         and definition.needs in ("", "stiffness")
@@ -184,17 +181,17 @@ def draw_snap(seed, number, later=False):
 
 def unit_force(scene):
     """Force whose mean stress is E; in bending that of F L^2 = E I. Of the sign of the load."""
-    kind, side = LOADS[scene.load].kind.name, scene.height
+    kind, side = st.LOADS[scene.load].kind.name, scene.height
     if kind == "bending":
         size = scene.height**3 / (12 * scene.length**2)
     else:
         size = scene.length if kind in ("shear", "face") else side
-    return LOADS[scene.load].sign * scene.young_modulus * scene.thickness * size
+    return st.LOADS[scene.load].sign * scene.young_modulus * scene.thickness * size
 
 
 def column(scene):
     """Euler's load of a column that leans, of the sign of the load, less what shear takes."""
-    kind = LOADS[scene.load].kind.name
+    kind = st.LOADS[scene.load].kind.name
     along, across = (scene.height, scene.length) if kind == "face" else (scene.length, scene.height)
     euler = math.pi**2 / 48 * (across / along) ** 2
     return unit_force(scene) * euler / (1 + 3.2 * euler)
@@ -203,7 +200,7 @@ def column(scene):
 def body_of(scene, mesh, springs):
     """The scene's body in the mechanics of the audit: energies from the definitions' formulas."""
     x, height, length = mesh.points, scene.height, scene.length
-    kind, nu = LOADS[scene.load].kind.name, scene.poisson_ratio
+    kind, nu = st.LOADS[scene.load].kind.name, scene.poisson_ratio
     left, right = np.abs(x[:, 0]) < 1e-9 * length, np.abs(x[:, 0] - length) < 1e-9 * length
     bottom, top = np.abs(x[:, 1]) < 1e-9 * height, np.abs(x[:, 1] - height) < 1e-9 * height
     held = np.zeros(x.shape, bool)
@@ -229,7 +226,7 @@ def body_of(scene, mesh, springs):
             on, part = even(side, 0)
             pattern[on, 1] += sign * (1 - 3 * nu) / 2 * length / height * part
     follower = None
-    if LOADS[scene.load].follower and scene.kinematics == "nonlinear":
+    if st.LOADS[scene.load].follower and scene.kinematics == "nonlinear":
         ends = np.stack([order[:-1], order[1:]], axis=1)
         follower = Part(ends, follower_forces, np.full(len(ends), 1 / length))
 
@@ -326,13 +323,13 @@ def audit(scene, path=True):
     path : bool
         Whether to follow the path from rest, which takes longest.
     """
-    mesh = MESH_TYPES[scene.mesh_type](scene.length, scene.height, scene.size)
-    stiffness = 0.85 * scene.young_modulus * scene.thickness if DEFINITIONS[scene.definition].needs else None
+    mesh = st.MESH_TYPES[scene.mesh_type](scene.length, scene.height, scene.size)
+    stiffness = 0.85 * scene.young_modulus * scene.thickness if st.DEFINITIONS[scene.definition].needs else None
     try:
-        springs = DEFINITIONS[scene.definition].springs(mesh, scene.material, scene.thickness, stiffness)
-    except DefinitionError:
+        springs = st.DEFINITIONS[scene.definition].springs(mesh, scene.material, scene.thickness, stiffness)
+    except st.DefinitionError:
         return []
-    body, masses, load = body_of(scene, mesh, springs), masses_of(mesh), LOADS[scene.load]
+    body, masses, load = body_of(scene, mesh, springs), masses_of(mesh), st.LOADS[scene.load]
     force = unit_force(scene) * scene.level
     if scene.way == "critical" and scene.load not in ("compression", "pressure", "follower-pressure"):
         force = 0.3 * unit_force(scene)
@@ -352,7 +349,7 @@ def audit(scene, path=True):
     }  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # thick ones are drawn, too
-        beam = Beam(scene.length, scene.height, scene.thickness)
+        beam = st.Beam(scene.length, scene.height, scene.thickness)
     result = solve_scene(task, partial(solve_beam, beam, MeshCache(mesh, scene.thickness), None))
     if str(result["status"]) != "solved":
         return []
@@ -366,7 +363,7 @@ def audit_snap(scene, path=True):
     mesh, held, pattern, given, edges = arch.parts()
     try:
         springs = arch.springs(mesh)
-    except (DefinitionError, SingularError):
+    except (st.DefinitionError, SingularError):
         return []
     follower = pressure = judge = None
     if arch.load == "follower-pressure":

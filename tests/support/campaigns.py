@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from springtune.studies.config.messages import StudyError
-from springtune.studies.kinds import collect, load_study
+import springtune as st
+from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.plan import mesh_key, stem
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
@@ -19,12 +19,12 @@ EVERY = {"sensitivity": ("reference",), "calibrate": ("sensitivity",), "solve": 
 def load_text(folder, text, name="study.yaml"):
     """Load a study from its text, or its bytes."""
     (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return load_study(folder / name)
+    return st.load_study(folder / name)
 
 
 def refusal(folder, text, name="study.yaml"):
     """Message that the text of a study gets, without the folder."""
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(st.StudyError) as caught:
         load_text(folder, text, name)
     return str(caught.value).replace(f"{folder}/", "")
 
@@ -42,7 +42,7 @@ class Campaign:
     def __init__(self, config):
         for cache in (mesh_key, stem):  # a run is a process of its own, and files change
             cache.cache_clear()
-        self.config, self.study = str(config), load_study(config)
+        self.config, self.study = str(config), st.load_study(config)
         self.folder = Path("results") / self.study.name
         self.jobs = rerun.jobs(self.study, self.folder)
         self.bundles = {name: job for name, job in self.jobs.items() if job.stage}

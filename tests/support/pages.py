@@ -11,8 +11,8 @@ from typing import NamedTuple
 import yaml
 from click.testing import CliRunner
 
+import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds import load_study
 
 REPOSITORY = Path(__file__).parents[2]
 COMMANDS = ("make", "snakemake", "springtune", "python", "cp", ".", "cd", "paraview")
@@ -57,7 +57,7 @@ def check_command(words, folder):
     if name in ("make", "snakemake"):
         _, options = parse_args(arguments if len(arguments) > 1 else [])
         for study in options.configfile or []:
-            load_study(folder / study)
+            st.load_study(folder / study)
     elif name == "python":
         written = arguments[0].endswith(".newton.py")  # by the command before it
         assert written or (REPOSITORY / arguments[0]).is_file() or arguments[0] == "-m", words
@@ -68,7 +68,7 @@ def check_command(words, folder):
         if arguments[0] == "run":  # what is not its own is Snakemake's
             study, *options = (word for word in arguments[1:] if word not in known)
             parse_args([*options, "--configfile", study])
-            load_study(folder / study)
+            st.load_study(folder / study)
             return
         assert {word for word in arguments if word.startswith("--")} <= known, words
 

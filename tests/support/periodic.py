@@ -4,10 +4,11 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.spatial import Delaunay
 
+import springtune as st
 from springtune.linalg.factors import SingularError, SuperLUFactor
 from springtune.mechanics.moduli import unit_fields, work_of
 from springtune.mechanics.network import Network
-from springtune.mesh import Mesh, signed_areas
+from springtune.mesh import signed_areas
 
 
 def periodic_delaunay(points, length, height):
@@ -27,7 +28,7 @@ def periodic_delaunay(points, length, height):
     first = np.take_along_axis(triangles, order.argmin(axis=1)[:, None], axis=1)[:, 0]
     triangles = triangles[first < count]
     used, places = np.unique(np.concatenate([np.arange(count), triangles.ravel()]), return_inverse=True)
-    mesh = Mesh(spread[used], places[count:].reshape(-1, 3))
+    mesh = st.Mesh(spread[used], places[count:].reshape(-1, 3))
     assert len(triangles) == 2 * count and abs(mesh.area / (length * height) - 1) < 1e-9, "they do not cover one period"
     return mesh, used % count
 

@@ -2,30 +2,28 @@
 
 import numpy as np
 
+import springtune as st
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.loads import AXIAL
-from springtune.problem.shapes import LoadCase, Quantity, Support, Traction
 from springtune.scene.mesh_cache import MeshCache
-from springtune.springs import Springs
 from springtune.springs.lattice import uniform
 
 
 def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind=AXIAL):
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
-    mesh = MESH_TYPES[mesh_type](length, height, size)
+    mesh = st.MESH_TYPES[mesh_type](length, height, size)
     sheet = MeshCache(mesh, 1.0)
-    return sheet.problem(kind, Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
+    return sheet.problem(kind, st.Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
 
 
-CLAMP = (Support("left", x=0, y=0),)
+CLAMP = (st.Support("left", x=0, y=0),)
 
 
 def pulled(*force, name="pull", components="x", supports=CLAMP, others=()):
     """Load case of a force on the right side, the left one held; its displacements there, and others."""
-    ends = [Quantity("end" if components == one else one, "displacement", "right", one) for one in components]
-    return LoadCase(name, supports, [Traction("right", force)], quantities=[*ends, *others])
+    ends = [st.Quantity("end" if components == one else one, "displacement", "right", one) for one in components]
+    return st.LoadCase(name, supports, [st.Traction("right", force)], quantities=[*ends, *others])
 
 
 def free_network(mesh, springs):
@@ -35,7 +33,7 @@ def free_network(mesh, springs):
 
 def arch(stiffness=1.0, rise=0.1):
     """Two springs from supports 2 m apart to a particle in the middle, so high above them (von Mises' truss)."""
-    mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise]]), np.array([[0, 1, 2]]))
+    mesh = st.Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise]]), np.array([[0, 1, 2]]))
     held = np.array([[True, True], [True, True], [True, False]])
     network = Network(mesh, held, stiffness * (mesh.edges != [0, 1]).any(axis=1))
     return StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))

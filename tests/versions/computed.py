@@ -7,7 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from springtune.studies.kinds import collect, load_study
+import springtune as st
+from springtune.studies.kinds import collect
 from springtune.studies.runs import attempts
 from springtune.studies.runs.plan import plan
 
@@ -15,6 +16,6 @@ if __name__ == "__main__":
     study, output = map(Path, sys.argv[1:])
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
-        for job in plan(load_study(study), folder).values():
+        for job in plan(st.load_study(study), folder).values():
             attempts.do_tasks(job.stage.module, job.content)
-        collect.run(load_study(study), folder, output)
+        collect.run(st.load_study(study), folder, output)

@@ -9,7 +9,7 @@ import snakemake.api
 import snakemake.report.html_reporter  # noqa: F401
 from snakemake.cli import get_argument_parser
 
-from springtune.studies.kinds import load_study  # noqa: F401
+# noqa: F401
 from springtune.studies.runs import rerun  # noqa: F401
 from springtune.studies.runs.keys import stage_key
 from springtune.studies.runs.plan import stages

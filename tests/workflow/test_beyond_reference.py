@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.studies.kinds import collect, load_study
+import springtune as st
+from springtune.studies.kinds import collect
 from springtune.studies.output import page
 from springtune.studies.runs import store
 
@@ -92,7 +93,7 @@ def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
     try:
         store.add(file, {file.stem: {"message": lost, "seconds": 0.1}})
         path = run.folder / "beyond.yaml"
-        collect.run(load_study(path), run.folder / "results/beyond", tmp_path / "dataset.nc")
+        collect.run(st.load_study(path), run.folder / "results/beyond", tmp_path / "dataset.nc")
     finally:
         file.write_bytes(kept)
     text = (tmp_path / "summary.txt").read_text()

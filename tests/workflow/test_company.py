@@ -6,7 +6,7 @@ import random
 import h5py
 import pytest
 
-from springtune.studies.kinds import load_study
+import springtune as st
 from springtune.studies.runs import attempts, store
 from springtune.studies.runs.plan import plan
 
@@ -84,7 +84,7 @@ def without_times(value):
 def study(tmp_path_factory):
     path = tmp_path_factory.mktemp("company") / "many.yaml"
     path.write_text(STUDY)
-    return load_study(path)
+    return st.load_study(path)
 
 
 @pytest.fixture(scope="module")

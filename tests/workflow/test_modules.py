@@ -74,10 +74,7 @@ def test_hooks_of_another_workflow_may_call_ours(others):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        (
-            {"further": "    prefix: 'there'\n"},
-            "module of springtune: results are in results/<study> and take no",
-        ),
+        ({"further": "    prefix: 'there'\n"}, "module of springtune: results are in results/<study> and take no"),
         ({"config": "{'study': 3}"}, "study: 3 is no path; give that of a study's YAML file"),
         ({"config": "{'study': 'none.yaml'}"}, "none.yaml: cannot be read: No such file or directory"),
     ],

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.studies.config.messages import StudyError
-from springtune.studies.kinds import load_study
+import springtune as st
 
 from campaigns import Campaign
 from tables import STUDIES
@@ -61,8 +60,8 @@ def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
 def test_bad_input_ends_a_run_with_its_message_and_nothing_written(run):
     """Whatever the message is: to Snakemake all of them are one error."""
     run.write("worse.yaml", study("5 mm").replace("beam: small", "beem: small"))
-    with pytest.raises(StudyError) as caught:
-        load_study(run.folder / "worse.yaml")
+    with pytest.raises(st.StudyError) as caught:
+        st.load_study(run.folder / "worse.yaml")
     code, output = run.snakemake("worse.yaml")
     assert code == 1
     for line in str(caught.value).splitlines():

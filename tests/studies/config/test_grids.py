@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 import yaml
 from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
-import springtune
+import springtune as st
 from springtune.problem.parameters import MOST_SCENES_VARIABLE, SWEPT
 from springtune.studies.config.fields import spaced
-from springtune.studies.config.messages import StudyError
-from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from tables import STUDIES, refused_files
@@ -41,7 +39,7 @@ def load(tmp_path):
 
     def load(head=HEAD, **keys):
         (tmp_path / "study.yaml").write_text(head + grid_text(GRID | keys))
-        return load_study(tmp_path / "study.yaml")
+        return st.load_study(tmp_path / "study.yaml")
 
     return load
 
@@ -51,7 +49,7 @@ def refusal(load, tmp_path):
     """Message that a grid gets, without the folder."""
 
     def refusal(**keys):
-        with pytest.raises(StudyError) as caught:
+        with pytest.raises(st.StudyError) as caught:
             load(**keys)
         return str(caught.value).replace(f"{tmp_path}/", "")
 
@@ -60,10 +58,10 @@ def refusal(load, tmp_path):
 
 class TestRanges:
     @given(
-        st.floats(1e-6, 1e6),
-        st.floats(1.001, 1e6),
-        st.integers(2, 40),
-        st.sampled_from(["linear", "logarithmic"]),
+        some.floats(1e-6, 1e6),
+        some.floats(1.001, 1e6),
+        some.integers(2, 40),
+        some.sampled_from(["linear", "logarithmic"]),
     )
     def test_ends_are_exact_and_steps_even(self, first, factor, points, spacing):
         last = first * factor
@@ -130,7 +128,7 @@ class TestSwept:
 
     def test_printed_cells_are_not_swept(self, load, tmp_path):
         (tmp_path / "printed.csv").write_text("")
-        with pytest.raises(StudyError, match="printed: printed cells know no force, which grids sweep"):
+        with pytest.raises(st.StudyError, match="printed: printed cells know no force, which grids sweep"):
             load(HEAD.replace("grids:", "printed: printed.csv\ngrids:"), force=["1 N", "2 N"])
 
     def test_labels_and_names_tell_scenes_apart(self, load):
@@ -211,11 +209,11 @@ def test_a_stiffer_network_gives_way_as_one_under_less_force(swept):
 
 def test_figures_show_the_last_values_and_say_which(swept):
     tree, _, _ = swept
-    assert springtune.plot_sensitivity(tree)
-    (panel,) = springtune.plot_size(tree)
+    assert st.plot_sensitivity(tree)
+    (panel,) = st.plot_size(tree)
     title = panel.get_title(loc="left").replace("\n", " ").replace("\u00a0", " ")
     assert title == "long (200 x 30 mm), 125 N, thickness 3 mm, E = 2 GPa, nu = 0.5"
-    (panel,) = springtune.plot_sweep(tree, parameter="force")
+    (panel,) = st.plot_sweep(tree, parameter="force")
     lines = {line.get_label(): line for line in panel.lines if line.get_label() in ("lattice", "delingette")}
     assert [*lines["lattice"].get_xdata()] == [100.0, 125.0]
     wanted = tree.deformation_error.sel(
@@ -224,10 +222,10 @@ def test_figures_show_the_last_values_and_say_which(swept):
     assert lines["lattice"].get_ydata() == pytest.approx(100 * wanted.values.ravel())
     doubted = tree.to_dataset()
     doubted = doubted.assign(reference_applies=0 * doubted.reference_applies)
-    (panel,) = springtune.plot_sweep(doubted, parameter="force")
+    (panel,) = st.plot_sweep(doubted, parameter="force")
     assert any("hollow: beyond small strain" in text.get_text().replace("\n", " ") for text in panel.texts)
     with pytest.raises(ValueError, match="parameter: 'height' is not swept; the study sweeps force, thickness"):
-        springtune.plot_sweep(tree, parameter="height")
+        st.plot_sweep(tree, parameter="height")
 
 
 def of_grids(folder, name, grids, **keys):
@@ -271,7 +269,7 @@ def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
 
 def test_forces_of_equal_products_are_one_label(here):
     grid = {"load": "pressure", "pressure": ["2 MPa", "3 MPa"], "thickness": ["1 mm", "1.5 mm"]}
-    study = load_study(of_grids(here, "press", [grid], beams={"60x20": {"length": "70 mm", "height": "20 mm"}}))
+    study = st.load_study(of_grids(here, "press", [grid], beams={"60x20": {"length": "70 mm", "height": "20 mm"}}))
     assert study.axes["force"] == (140.0, 210.0, 315.0)
 
 
@@ -280,25 +278,25 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
     grid |= {"mesh_size": "10 mm"}
     coarse = grid | {"load": "traction", "mesh_size": "20 mm", "force": "1 kN"}
     Campaign(of_grids(here, "said", [grid, coarse], outputs=["deformed", "paraview"])).finish()
-    with springtune.open("results/said") as tree:
+    with st.open("results/said") as tree:
         fields = tree["fields"].to_dataset()[["shown_force", "shown_thickness"]].squeeze(drop=True)
         # Each load has its coarsest mesh, and the last values there.
         assert fields.shown_force.sel(load=["traction", "bending"]).values.tolist() == [1e3, 2e3]
         assert fields.shown_thickness.values.tolist() == [2e-3, 2e-3]
         place = {"beam": "60x20", "mesh_type": "structured", "load": "bending", "mesh_size": 10e-3}
-        network = springtune.field(tree, **place, force=2e3, thickness=2e-3).squeeze()
+        network = st.field(tree, **place, force=2e3, thickness=2e-3).squeeze()
         assert (float(network.force), float(network.thickness)) == (2e3, 2e-3)
-        beam = springtune.Beam("60 mm", "20 mm", "2 mm")
-        mesh = springtune.make_mesh(beam, "structured", "10 mm")
-        steel = springtune.Material("210 GPa", 0.3)
-        scene = springtune.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear")
+        beam = st.Beam("60 mm", "20 mm", "2 mm")
+        mesh = st.make_mesh(beam, "structured", "10 mm")
+        steel = st.Material("210 GPa", 0.3)
+        scene = st.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear")
         result = scene.solve()
         small = 1e-9 * np.abs(result.displacements).max()
         assert np.allclose(network.displacement_y.values, result.displacements[:, 1], rtol=1e-9, atol=small)
         assert np.allclose(network.spring_force.values, result.spring_forces, rtol=1e-5, atol=1e-3)
         with pytest.raises(ValueError, match=r"fields are not kept of force 1000.0; they are of 2000.0"):
-            springtune.field(tree, **place, force=1e3)
-        (panel,) = springtune.plot_deformed(tree, load="bending", kinematics="linear")
+            st.field(tree, **place, force=1e3)
+        (panel,) = st.plot_deformed(tree, load="bending", kinematics="linear")
         assert "2\u00a0kN, thickness 2\u00a0mm, mesh 10 mm" in panel.get_title(loc="left").replace("\n", " ")
         assert not [text for text in panel.texts if "no network" in text.get_text()]
         pieces = sorted((here / "results/said/paraview").glob("*.vtu"))

@@ -12,16 +12,12 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import strategies as some
 
+import springtune as st
 from springtune.cli import main
-from springtune.problem.geometry import Beam
-from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
 from springtune.studies.config.kind import kinds, outputs
-from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec
-from springtune.studies.kinds import load_study
 
 from tables import STUDIES, refused_files, study_text
 
@@ -42,8 +38,8 @@ def mesh_name(mesh):
 class TestExpansion:
     def test_values_are_si(self, load):
         study = load(SMALL)
-        long, short = Beam(0.2, 0.03, 0.001, "long"), Beam(0.1, 0.02, 0.002, "short")
-        steel = Material(210e9, 0.3, name="steel")
+        long, short = st.Beam(0.2, 0.03, 0.001, "long"), st.Beam(0.1, 0.02, 0.002, "short")
+        steel = st.Material(210e9, 0.3, name="steel")
         assert study.scenes[0] == SceneSpec(
             MeshSpec(long, "structured", 0.002), steel, "traction", 300e3, "paper", "nonlinear"
         )
@@ -98,10 +94,10 @@ AXES = {
 }
 
 
-@st.composite
+@some.composite
 def grids(draw):
-    grid = {name: draw(st.lists(st.sampled_from(values), min_size=1, unique=True)) for name, values in AXES.items()}
-    return grid | {"force": "1 N", "sensitivity": draw(st.booleans())}
+    grid = {name: draw(some.lists(some.sampled_from(values), min_size=1, unique=True)) for name, values in AXES.items()}
+    return grid | {"force": "1 N", "sensitivity": draw(some.booleans())}
 
 
 def study_of(path, asked):
@@ -111,11 +107,11 @@ def study_of(path, asked):
         "beam": "long", "load": "traction", "definition": "lattice", "force": "1 N"
     }  # fmt: skip
     path.write_text(yaml.safe_dump(config, sort_keys=False))
-    return load_study(path)
+    return st.load_study(path)
 
 
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(grids(), min_size=1, max_size=3), st.randoms(use_true_random=False))
+@given(some.lists(grids(), min_size=1, max_size=3), some.randoms(use_true_random=False))
 def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, asked, random):
     study = study_of(tmp_path / "study.yaml", asked)
     expected = set()
@@ -154,7 +150,7 @@ def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, ask
 
 @pytest.fixture(scope="module")
 def study():
-    return load_study(CONFIG / "paper.yaml")
+    return st.load_study(CONFIG / "paper.yaml")
 
 
 class TestPaper:
@@ -198,14 +194,14 @@ def _printed_range(text):
 
 
 def test_quick_is_small_but_has_everything():
-    study = load_study(CONFIG / "quick.yaml")
+    study = st.load_study(CONFIG / "quick.yaml")
     assert len(study.scenes) <= 50
     assert min(mesh.mesh_size for mesh in study.meshes) >= 0.002
     assert {mesh.beam.name for mesh in study.meshes} == {"100x20"}
-    whole = load_study(CONFIG / "paper.yaml").axes
+    whole = st.load_study(CONFIG / "paper.yaml").axes
     for dimension in ("mesh_type", "material", "load", "definition", "kinematics"):
         assert set(study.axes[dimension]) >= set(whole[dimension])
-    assert study.axes["load"] == tuple(LOADS)
+    assert study.axes["load"] == tuple(st.LOADS)
     # Which would give its dataset further dimensions, and further labels; engines have seconds of compiling.
     assert set(study.outputs) == set(outputs()) - {"sweep", "shapes", "engines"}
 
@@ -244,8 +240,8 @@ def test_a_section_that_computes_needs_no_grid(load, refusal, key):
 
 def test_missing_file_and_folder(tmp_path):
     for path in (tmp_path / "no.yaml", tmp_path):
-        with pytest.raises(StudyError, match="cannot be read: .*; give the path of a study"):
-            load_study(path)
+        with pytest.raises(st.StudyError, match="cannot be read: .*; give the path of a study"):
+            st.load_study(path)
 
 
 def test_name_of_the_file(refusal):
@@ -336,7 +332,7 @@ def test_one_range_of_poissons_ratio(refusal, tmp_path, ratio):
     """Above -1 and at most 0.5: for the library, `predict`, `springs`, and materials, grids, samples."""
     legal, value = -1 < float(ratio) <= 0.5, float(ratio)
     with nullcontext() if legal else pytest.raises(ValueError, match="Poisson's ratio of 'm' is .*: isotropic"):
-        Material(1e9, value, name="m")
+        st.Material(1e9, value, name="m")
     sheet = ["--beam", "40x10", "--size", "5 mm", "--young", "1 GPa", "--poisson", ratio]
     out = ["--definition", "patch", "--out", str(tmp_path / "net.csv")]
     for call in (["predict", *sheet, "--load", "traction"], ["springs", *sheet, *out]):
@@ -350,6 +346,6 @@ def test_one_range_of_poissons_ratio(refusal, tmp_path, ratio):
     ):
         (tmp_path / "one.yaml").write_text(text)
         if legal:
-            load_study(tmp_path / "one.yaml")
+            st.load_study(tmp_path / "one.yaml")
         else:
             assert "is out of range; give a number above -1 and at most 0.5" in refusal(text)

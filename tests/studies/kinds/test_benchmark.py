@@ -3,18 +3,14 @@
 import numpy as np
 import pytest
 
+import springtune as st
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, weights
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
-from springtune.springs import DefinitionError
 from springtune.springs.lattice import half_weight
 from springtune.studies.kinds.benchmark import OTHER_APPROACHES, approach_names
 from springtune.studies.kinds.benchmark import solve as benchmark
@@ -23,11 +19,11 @@ from springtune.studies.kinds.benchmark.kind import KIND
 from springtune.studies.kinds.benchmark.solve import LoadedBeam
 from springtune.studies.kinds.collect import group_of
 
-BEAM = Beam(0.1, 0.02, 1e-3, "100x20")
+BEAM = st.Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {
-    "traction": LoadedBeam(BEAM, Material(210e9, 0.3, 7850.0, "steel"), "traction", 20e3),
-    "bending": LoadedBeam(BEAM, Material(210e9, 0.3, 7850.0, "steel"), "bending", 200.0),
-    "block": LoadedBeam(BEAM, Material(1e6, 0.49, 1000.0, "rubber"), "pressure", -10.0),
+    "traction": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), "traction", 20e3),
+    "bending": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), "bending", 200.0),
+    "block": LoadedBeam(BEAM, st.Material(1e6, 0.49, 1000.0, "rubber"), "pressure", -10.0),
 }
 CLOSE = {
     # largest error at 2 mm, ten rows: linear triangles; quadratic; constant boundary elements; no physics
@@ -106,7 +102,7 @@ def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
     found = measured(approaches, (2e-3, 5e-3, 1e-2), [1e-2, *[2e-3] * 4])
     seconds = found.seconds.values
     assert np.isfinite(seconds[1]).all() and np.isfinite(seconds[0]).tolist() == [False, False, True]
-    assert found.status.values[0].tolist() == [Status.NOT_REQUESTED, Status.NOT_REQUESTED, Status.SOLVED]
+    assert found.status.values[0].tolist() == [st.Status.NOT_REQUESTED, st.Status.NOT_REQUESTED, st.Status.SOLVED]
     assert not found.message.any() and abs(found.error[2, 2]) < 0.01
     parts = sum(found[f"{part}_seconds"].values[1] for part in benchmark.PARTS)
     assert (parts > 0).all() and (found.factorizing_seconds[1] > 0).all()
@@ -115,9 +111,9 @@ def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
 @pytest.mark.parametrize(
     ("error", "status", "message"),
     [
-        (DefinitionError("no stiffness"), Status.FAILED, "no stiffness"),
-        (MemoryError(), Status.FAILED, "not enough memory"),
-        (ArithmeticError("no end"), Status.NOT_CONVERGED, "no end"),
+        (st.DefinitionError("no stiffness"), st.Status.FAILED, "no stiffness"),
+        (MemoryError(), st.Status.FAILED, "not enough memory"),
+        (ArithmeticError("no end"), st.Status.NOT_CONVERGED, "no end"),
     ],
 )
 def test_a_case_that_fails_is_a_hole_that_says_so(error, status, message, monkeypatch):
@@ -129,7 +125,7 @@ def test_a_case_that_fails_is_a_hole_that_says_so(error, status, message, monkey
     monkeypatch.setitem(APPROACHES, "condensation", approach)
     sizes = (2e-3, 5e-3)
     found = measured(("condensation", "linear-triangles"), sizes, [2e-3] * 2)
-    assert found.status.values.tolist() == [[status, Status.SOLVED], [Status.SOLVED, Status.SOLVED]]
+    assert found.status.values.tolist() == [[status, st.Status.SOLVED], [st.Status.SOLVED, st.Status.SOLVED]]
     assert message in found.message.item(0) and np.isfinite(found.seconds).values.tolist() == [
         [False, True],
         [True, True],
@@ -144,7 +140,7 @@ def test_an_error_of_the_program_is_raised(monkeypatch):
 
 def test_beyond_its_seconds_an_approach_is_not_run_on_finer_sizes():
     found = measured(("linear-triangles",), (5e-3, 1e-2), (5e-3,), 0.0)
-    assert found.status.values[0].tolist() == [Status.FAILED, Status.SOLVED]
+    assert found.status.values[0].tolist() == [st.Status.FAILED, st.Status.SOLVED]
     assert found.message.values[0].tolist() == ["not run: at 10 mm it took longer than the 0 s of `most_seconds`", ""]
 
 
@@ -157,20 +153,20 @@ def test_explicit_steps_have_a_rate():
 
 
 def test_multigrid_gives_what_the_factorization_gives():
-    mesh = MESH_TYPES["structured"](0.2, 0.04, 2e-3)
+    mesh = st.MESH_TYPES["structured"](0.2, 0.04, 2e-3)
     pattern = weights(mesh, AXIAL)
     answers = []
     for solver in ("SuperLU", "multigrid"):
         problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh), solver=solver), pattern)
         found = problem.linear(1e-3)
-        assert found.converged and problem.judge(1e-3, found)[0] is Status.SOLVED
+        assert found.converged and problem.judge(1e-3, found)[0] is st.Status.SOLVED
         answers.append((found.factor.name, float(np.tensordot(found.displacements, pattern, axes=2))))
     assert [name for name, _ in answers] == ["SuperLU", "multigrid"]
     assert answers[1][1] == pytest.approx(answers[0][1], rel=1e-9)
 
 
 def test_multigrid_refuses_a_network_beyond_its_buckling_load():
-    mesh = MESH_TYPES["structured"](0.2, 0.01, 2e-3)
+    mesh = st.MESH_TYPES["structured"](0.2, 0.01, 2e-3)
     problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh)), weights(mesh, AXIAL))
     bent = 5e-3 * problem.slope / np.abs(problem.slope).max() * -1
     assert problem.network.factorize_tangent(bent).negative_pivots > 0

@@ -10,14 +10,10 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-from springtune.mesh import MESH_TYPES
-from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
-from springtune.problem.status import Status
+import springtune as st
 from springtune.reference.answers import unit_scales
 from springtune.reference.small_strain import solve_unit
 from springtune.scene.mesh_cache import MeshCache
-from springtune.springs import DEFINITIONS
 from springtune.studies.kinds.samples import designs, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
@@ -158,28 +154,28 @@ class TestOnce:
     """What is solved once for many scenes is what each of them would be."""
 
     @pytest.mark.parametrize(
-        "name", [name for name, one in DEFINITIONS.items() if not one.needs and name not in ("adjoint", "yeoh")]
+        "name", [name for name, one in st.DEFINITIONS.items() if not one.needs and name not in ("adjoint", "yeoh")]
     )
     def test_an_answer_scales_with_force_over_young_modulus_and_thickness(self, name):
         type_name = "isosceles-0.3" if name == "axis-exact" else "structured"
-        type_name = type_name if 3 in DEFINITIONS[name].cells else "braced"
-        mesh = MESH_TYPES[type_name](0.1, 0.04, 0.01)
-        kind, modulus, thickness, force = LOADS["traction"].kind, 3.7e9, 2.3e-3, 123.0
+        type_name = type_name if 3 in st.DEFINITIONS[name].cells else "braced"
+        mesh = st.MESH_TYPES[type_name](0.1, 0.04, 0.01)
+        kind, modulus, thickness, force = st.LOADS["traction"].kind, 3.7e9, 2.3e-3, 123.0
         unit, own = MeshCache(mesh, 1.0), MeshCache(mesh, thickness)
-        once = unit.solve(kind, unit.derive(name, Material(1.0, 0.3))[0], 1.0, "linear").displacement
-        solved = own.solve(kind, own.derive(name, Material(modulus, 0.3))[0], force, "linear").displacement
+        once = unit.solve(kind, unit.derive(name, st.Material(1.0, 0.3))[0], 1.0, "linear").displacement
+        solved = own.solve(kind, own.derive(name, st.Material(modulus, 0.3))[0], force, "linear").displacement
         assert solved == pytest.approx(force / (modulus * thickness) * once, rel=1e-9)
 
     @pytest.mark.parametrize("name", ["uniform", "lattice", "area", "delingette"])
     def test_a_sheet_like_another_has_the_same_numbers_to_the_bit(self, name):
-        before = MeshCache(MESH_TYPES["structured"](0.1, 0.04, 0.01), 1.0)
-        kind = LOADS["bending"].kind
-        before.solve(kind, before.derive(name, Material(1.0, 0.3))[0], 1.0, "linear")
+        before = MeshCache(st.MESH_TYPES["structured"](0.1, 0.04, 0.01), 1.0)
+        kind = st.LOADS["bending"].kind
+        before.solve(kind, before.derive(name, st.Material(1.0, 0.3))[0], 1.0, "linear")
         box = (0.103, 0.0391, 0.01)
         answers = []
         for like in (None, before):
-            sheet = MeshCache(MESH_TYPES["structured"](*box), 1.0, like=like)
-            springs, _ = sheet.derive(name, Material(1.0, 0.3))
+            sheet = MeshCache(st.MESH_TYPES["structured"](*box), 1.0, like=like)
+            springs, _ = sheet.derive(name, st.Material(1.0, 0.3))
             answers += [sheet.solve(kind, springs, 1e-4, how).displacement for how in ("linear", "nonlinear")]
         assert answers[:2] == answers[2:]
         assert sheet.mesh.edges is before.mesh.edges
@@ -189,13 +185,13 @@ class TestOnce:
         for row in range(0, data.sizes["sample"], 7):
             one = data.isel(sample=row)
             box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
-            sheet = MeshCache(MESH_TYPES["structured"](*box), float(one.thickness))
+            sheet = MeshCache(st.MESH_TYPES["structured"](*box), float(one.thickness))
             for load in ("traction", "compression"):
                 for name in ("lattice", "area"):
-                    material = Material(float(one.young_modulus), float(one.poisson_ratio))
+                    material = st.Material(float(one.young_modulus), float(one.poisson_ratio))
                     springs, _ = sheet.derive(name, material)
-                    force = LOADS[load].sign * float(one.force)
-                    wanted = sheet.solve(LOADS[load].kind, springs, force, "linear")
+                    force = st.LOADS[load].sign * float(one.force)
+                    wanted = sheet.solve(st.LOADS[load].kind, springs, force, "linear")
                     found = one.sel(load=load, definition=name)
                     assert int(found.status) == wanted.status
                     assert float(found.displacement) == pytest.approx(wanted.displacement, rel=1e-9)
@@ -261,7 +257,7 @@ class TestRuns:
         further = ("definition: lattice\n  parameters", "definition: [lattice, van-gelder]\n  parameters")
         tree, _ = run(("size: 16", "size: 32"), further, name="sample")
         assert [len(store.stored_keys(path) - keys) for path, keys in before.items()] == [1] * len(before)
-        assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
+        assert (tree["samples"].status.sel(load="traction") == st.Status.SOLVED).all()
 
     @pytest.mark.slow
     def test_a_sample_needs_neither_grids_nor_beams_nor_materials(self, here):
@@ -288,9 +284,9 @@ class TestRuns:
     def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
         one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
         box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
-        sheet = MeshCache(MESH_TYPES["structured"](*box), float(one.thickness))
-        springs, _ = sheet.derive("uniform", Material(float(one.best_stiffness) / float(one.thickness), 0.3))
-        found = sheet.solve(LOADS["traction"].kind, springs, float(one.force), "linear").displacement
+        sheet = MeshCache(st.MESH_TYPES["structured"](*box), float(one.thickness))
+        springs, _ = sheet.derive("uniform", st.Material(float(one.best_stiffness) / float(one.thickness), 0.3))
+        found = sheet.solve(st.LOADS["traction"].kind, springs, float(one.force), "linear").displacement
         # Springs of k have sqrt(3)/2 E t = k at that E.
         assert found * np.sqrt(0.75) == pytest.approx(float(one.reference_displacement), rel=1e-9)
 
@@ -302,7 +298,7 @@ class TestFailures:
         area = ("definition: lattice\n  parameters", "definition: area\n  parameters")
         tree, _ = run(("size: 16", "size: 32"), area, (SIZES, "{from: 10 mm, to: 20 mm}"))
         data, found = tree["samples"].to_dataset(), tree["sobol"].to_dataset().sel(load="traction", definition="area")
-        solved = (data.status.sel(load="traction", definition="area") == Status.SOLVED).values.reshape(32, -1)
+        solved = (data.status.sel(load="traction", definition="area") == st.Status.SOLVED).values.reshape(32, -1)
         assert 0 < (~solved).sum() < solved.size
         lost = int((~solved.all(axis=1)).sum())
         error = found.sel(quantity="deformation_error")
@@ -325,7 +321,7 @@ class TestFailures:
         _, results = networks(tmp_path, *how, spent=spent)
         assert not spent.broken
         status = results[0]["status"]
-        assert set(np.flatnonzero(status != Status.SOLVED)) == set(map(int, results[0]["messages"]))
+        assert set(np.flatnonzero(status != st.Status.SOLVED)) == set(map(int, results[0]["messages"]))
         assert 0 < len(results[0]["messages"]) < 8
 
 
@@ -358,9 +354,9 @@ class TestReferences:
         assert (data.reference_error_estimate <= 1e-4).all() and (data.reference_applies == 1).all()
         assert data.deformation_error.notnull().all() and data.reference_message.item() == ""
         one = data.isel(sample=5)
-        kind = LOADS["traction"].kind
+        kind = st.LOADS["traction"].kind
         alone = solve_unit(float(one.length / one.height), float(one.poisson_ratio), kind)
-        material = Material(float(one.young_modulus), float(one.poisson_ratio))
+        material = st.Material(float(one.young_modulus), float(one.poisson_ratio))
         _, scale = unit_scales(one, material, kind)
         assert float(one.reference_displacement) == pytest.approx(float(one.force * scale) * alone.displacement)
         assert "without a reference" not in summary

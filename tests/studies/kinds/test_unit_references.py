@@ -3,16 +3,12 @@
 import numpy as np
 import pytest
 
+import springtune as st
 from springtune.reference.interpolant import TOLERANCE
-from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies import any_reference, collect
 from springtune.studies.kinds.bodies import plan as bodies_plan
 from springtune.studies.kinds.bodies.kind import summary
-from springtune.studies.kinds.bodies.plan import (
-    interpolants,
-    reference_of,
-    solved_reference,
-)
+from springtune.studies.kinds.bodies.plan import interpolants, reference_of, solved_reference
 from springtune.studies.runs import store
 from springtune.studies.runs.plan import plan
 
@@ -52,7 +48,7 @@ def load(tmp_path):
     def load(*parts, **options):
         path = tmp_path / "study.yaml"
         path.write_text(text(*parts, **options))
-        return load_study(path)
+        return st.load_study(path)
 
     return load
 

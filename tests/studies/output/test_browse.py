@@ -11,7 +11,7 @@ import xarray as xr
 from click.testing import CliRunner
 from test_dataset import GROUPS
 
-import springtune
+import springtune as st
 from springtune.cli import main
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.collect import group_of
@@ -27,7 +27,7 @@ def write(folder, *groups):
     """Write the dataset of a study, and a group that nobody knows."""
     tree = dataset(*groups)
     tree["weather"] = xr.DataTree(xr.Dataset({"rain": (("town", "day"), [[1.0, 2.0]])}, {"town": ["here"]}))
-    tree.attrs = {"springtune_version": springtune.__version__, "study": "mine", "title": TITLE, "note": float("nan")}
+    tree.attrs = {"springtune_version": st.__version__, "study": "mine", "title": TITLE, "note": float("nan")}
     tree.to_netcdf(folder / "dataset.nc", engine="h5netcdf")
     return folder / "dataset.nc"
 

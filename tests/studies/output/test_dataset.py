@@ -14,7 +14,6 @@ from cf import complaints
 from springtune.registry import import_name
 from springtune.safe_io import atomic
 from springtune.studies.config.kind import modules
-from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK_BYTES, Group
@@ -101,7 +100,7 @@ class TestConventions:
         dimensions = {dimension for row in group.variables.values() for dimension in row[0]}
         numbers = {"mesh_size", "stiffness_ratio", "face_position", "poisson_ratio", "friction", "strain"}
         axes = {one: (1.0, 2.0) if one in numbers else ("one", "two") for one in dimensions}
-        study = load_study(small(tmp_path))
+        study = st.load_study(small(tmp_path))
         attributes = provenance.attributes(study)
         dataset.write(tmp_path / "dataset.nc", {"/": group.empty(axes)}, attributes)
         assert complaints(tmp_path / "dataset.nc") == []
@@ -139,10 +138,10 @@ class TestProvenance:
     def test_a_changed_checkout_is_told(self, tmp_path):
         package, path = library(tmp_path), small(tmp_path)
         committed(tmp_path)
-        clean = provenance.attributes(load_study(path), package)
+        clean = provenance.attributes(st.load_study(path), package)
         assert len(clean["git_commit"]) == 40
         path.write_text(path.read_text().replace("Small", "Smaller"))
-        dirty = provenance.attributes(load_study(path), package)
+        dirty = provenance.attributes(st.load_study(path), package)
         assert dirty["git_commit"] == clean["git_commit"] + "+changes"
 
     def test_a_built_package_has_the_commit_that_it_was_built_from(self, tmp_path):
@@ -152,10 +151,10 @@ class TestProvenance:
         path = small(package / "workflow/config")
         committed(tmp_path)
         assert workflow_folder(package) == package / "workflow" and clone(package) is None
-        unknown = provenance.attributes(load_study(path), package)
+        unknown = provenance.attributes(st.load_study(path), package)
         assert unknown["git_commit"] == ""
         (package / "commit.txt").write_text("f00d\n")
-        known = provenance.attributes(load_study(path), package)
+        known = provenance.attributes(st.load_study(path), package)
         assert known["git_commit"] == "f00d"
 
 

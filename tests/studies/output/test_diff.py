@@ -148,10 +148,7 @@ class TestCommand:
         other.attrs |= {"springtune_version": "1", "inputs": json.dumps({"small.yaml": "2"})}
         other.attrs |= {"software": json.dumps({"numpy": "3.0"})}
         paths = written(made(), tmp_path / "one.nc"), written(other, tmp_path / "other.nc")
-        result = run(
-            "diff",
-            *paths,
-        )
+        result = run("diff", *paths)
         assert result.exit_code == 0
         said = [" ".join(line.split()) for line in result.stdout.splitlines()]
         assert {"springtune_version 0 -> 1", "numpy none -> 3.0"} <= set(said)

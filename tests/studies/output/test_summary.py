@@ -11,10 +11,9 @@ import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLogHandlerBase
 
+import springtune as st
 from snakemake_logger_plugin_springtune import Display, LogHandler
-from springtune.problem.status import Status
 from springtune.safe_io import atomic
-from springtune.studies.kinds import load_study
 from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import rerun
@@ -41,14 +40,14 @@ def cell(**chosen):
 def rows():
     """Four scenes on one beam and one on the other: solved by 1 % and -20 %, one each of what may go wrong."""
     known = {"material": "steel", "load": "traction", "kinematics": "linear"}
-    lost = {"status": Status.UNSTABLE, "deformation_error": 5.0, "message": "it would leave"}
+    lost = {"status": st.Status.UNSTABLE, "deformation_error": 5.0, "message": "it would leave"}
     return [
         *({"beam": one, "reference_displacement": 1e-3, "reference_applies": 1} | known for one in AXES["beam"]),
-        cell() | {"status": Status.SOLVED, "deformation_error": 0.01},
-        cell(definition="patch") | {"status": Status.SOLVED, "deformation_error": -0.2},
+        cell() | {"status": st.Status.SOLVED, "deformation_error": 0.01},
+        cell(definition="patch") | {"status": st.Status.SOLVED, "deformation_error": -0.2},
         cell(definition="patch", mesh_size=5e-3) | lost,
-        cell(mesh_size=5e-3) | {"status": Status.NOT_CONVERGED, "message": "residual 1e-3"},
-        cell(beam="80x10") | {"status": Status.FAILED, "message": "refuses the mesh"},
+        cell(mesh_size=5e-3) | {"status": st.Status.NOT_CONVERGED, "message": "residual 1e-3"},
+        cell(beam="80x10") | {"status": st.Status.FAILED, "message": "refuses the mesh"},
     ]
 
 
@@ -93,7 +92,7 @@ class TestText:
     def test_a_few_are_named_of_many_and_of_each_reason_one_first(self):
         beams = [f"beam-{letter}" for letter in "abcdefghij"]
         whys = [*(f"residual {number}.5e-3" for number in range(9)), "refused"]
-        rows = [cell(beam=beam) | {"status": Status.FAILED, "message": why} for beam, why in zip(beams, whys)]
+        rows = [cell(beam=beam) | {"status": st.Status.FAILED, "message": why} for beam, why in zip(beams, whys)]
         root = ROOT.of_rows(AXES | {"beam": beams}, rows)
         lines = told(root).splitlines()
         named = lines[lines.index("scenes, failed: 10 of 10") + 1 :][:4]
@@ -107,7 +106,7 @@ STUDY = STUDIES["summary"]
 def planned(tmp_path):
     """A study, its plan, and the names of its jobs."""
     (tmp_path / "two.yaml").write_text(STUDY)
-    study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
+    study, folder = st.load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
     made = rerun.jobs(study, folder)
     return study, made, [name for name, job in made.items() if job.stage]
 

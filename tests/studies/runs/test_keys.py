@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from springtune.engines.base import ENGINES
-from springtune.mesh import MESH_TYPES
-from springtune.springs import DEFINITIONS, Springs, definition
+import springtune as st
 from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
@@ -54,9 +52,9 @@ def test_a_module_counts_with_what_it_imports_and_with_nothing_else(row):
 
 
 def test_an_engine_and_a_mesher_have_keys_of_their_own():
-    assert keys.declared_key(ENGINES["xpbd"]) != keys.declared_key(ENGINES["vbd"])
+    assert keys.declared_key(st.ENGINES["xpbd"]) != keys.declared_key(st.ENGINES["vbd"])
     assert "netgen" in keys.mesh_type_closure("free").packages
-    assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
+    assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(st.MESH_TYPES) - {"free"})
     assert "meshio" in keys.mesh_type_closure("from a file").packages
 
 
@@ -137,12 +135,12 @@ def own(tmp_path, monkeypatch):
         importlib.import_module(name)
         keys.file_digest.cache_clear()
         found = keys.definition_closure("own")
-        DEFINITIONS.discard("own")
+        st.DEFINITIONS.discard("own")
         sys.modules.pop(name)
         return found
 
     yield closure
-    DEFINITIONS.discard("own")
+    st.DEFINITIONS.discard("own")
 
 
 OWN = '''\
@@ -197,11 +195,11 @@ def test_names_of_the_package_itself_are_followed(own):
 
 
 def test_a_definition_that_was_typed_is_refused_with_the_remedy():
-    space = {"Springs": Springs, "__name__": "prompt"}
+    space = {"Springs": st.Springs, "__name__": "prompt"}
     exec("springs = lambda mesh, material, thickness: Springs(1.0, mesh.edge_lengths)", space)
-    definition("own")(space["springs"])
+    st.definition("own")(space["springs"])
     try:
         with pytest.raises(ValueError, match="'own' was typed, and jobs of a study do not find it; put it into a"):
             keys.definition_closure("own")
     finally:
-        DEFINITIONS.discard("own")
+        st.DEFINITIONS.discard("own")

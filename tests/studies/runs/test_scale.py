@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import springtune as st
 from counting import counted
-from springtune.studies.kinds import collect, load_study
+from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies import plan
 from springtune.studies.output import page
 from springtune.studies.runs import rerun, store
@@ -39,7 +40,7 @@ def study_of(tool, tmp_path, monkeypatch):
 
 
 def planned(config):
-    study = load_study(config)
+    study = st.load_study(config)
     return study, rerun.jobs(study, Path("results") / study.name)
 
 
