@@ -13,7 +13,7 @@ from springtune.safe_io import atomic
 from ..config.kind import kinds, outputs
 from ..output import dataset, summing_up
 from ..runs import job, provenance, rerun
-from ..runs.plan import rows
+from ..runs.plan import plan, rows
 from ..runs.store import DamagedError
 from . import load_study
 
@@ -38,7 +38,7 @@ def run(study: "Study", folder: Path, output: Path) -> None:
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Write the dataset of a study, and the record of the job."""
     study = load_study(config)
-    if rerun.jobs(study, Path(folder))[rerun.COLLECT].digest != digest:
+    if rerun.collect_digest(study, plan(study, Path(folder))) != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     run(study, Path(folder), Path(output))
     atomic.write_json(record, {"digest": digest})

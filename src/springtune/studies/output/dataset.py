@@ -1,5 +1,6 @@
 """Dataset of a study: labelled arrays with units and the reasons of missing values."""
 
+import math
 import os
 import shutil
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
@@ -198,7 +199,8 @@ def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashabl
     variables, attributes = cf_encoder(variables, attributes)
     group.attrs.update(attributes)
     group.dimensions = {dim: size for dim, size in data.sizes.items() if above.get(dim) != size}
-    for name, array in variables.items():
+    # Labels first: one that comes after variables of its dimension is attached anew to each of them.
+    for name, array in sorted(variables.items(), key=lambda pair: pair[0] not in data.dims):
         fill, values = array.attrs.pop("_FillValue", None), array.values
         texts = values.dtype.kind in "OU"
         sparse = texts and values.nbytes > CHUNK_BYTES and np.mean(values == "") > MOSTLY_EMPTY_SHARE
@@ -237,18 +239,31 @@ LARGE_ARRAY_BYTES = 2**20
 
 def tree(file: h5netcdf.File) -> xr.DataTree:
     """Dataset of an open file: small arrays in memory, large ones read on demand."""
-    groups = {}
+    groups, sizes = {}, dict[str, int]()
     for group in (file, *file.groups.values()):
-        variables, attributes = H5NetCDFStore(group).load()  # type: ignore[no-untyped-call]
-        for array in variables.values():
-            if array.dtype == object and array.nbytes > LARGE_ARRAY_BYTES:
-                del array.encoding["dtype"]  # by which xarray would read texts at the width of the longest one
-        data = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
-        for one in data.variables.values():
+        store = H5NetCDFStore(group)  # type: ignore[no-untyped-call]
+        sizes |= {name: dimension.size for name, dimension in group.dimensions.items()}
+        variables = {}
+        for name, stored in group.variables.items():
+            texts = stored.dtype == object
+            if stored.dtype.itemsize * math.prod(sizes[dim] for dim in stored.dimensions) > LARGE_ARRAY_BYTES:
+                variables[name] = store.open_store_variable(name, stored)
+                if texts:
+                    del variables[name].encoding["dtype"]  # by which xarray would read texts as wide as the longest
+                continue
+            # h5netcdf looks up all dimensions for each slice of numbers; a whole array takes no look.
+            values = stored[...] if texts else np.asarray(stored)
+            variables[name] = xr.Variable(stored.dimensions, values, _attributes(stored))
+        groups[group.name] = xr.decode_cf(xr.Dataset(variables, attrs=_attributes(group)))
+        for one in groups[group.name].variables.values():
             if one.nbytes <= LARGE_ARRAY_BYTES:
                 one.load()
-        groups[group.name] = data
     return xr.DataTree.from_dict(groups)
+
+
+def _attributes(stored: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
+    """Attributes, with texts of fixed length as texts."""
+    return {name: value.decode() if isinstance(value, bytes) else value for name, value in stored.attrs.items()}
 
 
 # -- flags -------------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from ..config.model import Study
 from .keys import version_of
 from .source import COMMIT_FILE, PACKAGE, checksum, clone
 
-SOFTWARE = ("cvxopt h5netcdf h5py meshio netgen-mesher numba numpy pyamg scikit-fem scipy snakemake xarray").split()
+SOFTWARE = ("cvxopt h5netcdf h5py meshio netgen-mesher numba numpy scikit-fem scipy snakemake xarray").split()
 """Distributions whose versions a dataset holds."""
 
 CHANGED = "+changes"

@@ -53,7 +53,7 @@ def linked_files(study: Study) -> list[str]:
 def jobs(study: Study, folder: Path) -> dict[str, Job]:
     """All jobs of a study by name."""
     found, read = plan(study, folder), (str(folder / DATASET),)
-    made = [(COLLECT, _collect_digest(study, found), [DATASET, SUMMARY])]
+    made = [(COLLECT, collect_digest(study, found), [DATASET, SUMMARY])]
     for name, members in output_jobs(study).items():
         files = [file for one in members for file in output_files(one, study)]
         made.append((name, _present_digest(members, files), files))
@@ -64,7 +64,7 @@ def jobs(study: Study, folder: Path) -> dict[str, Job]:
     return found
 
 
-def _collect_digest(study: Study, jobs: dict[str, Job]) -> str:
+def collect_digest(study: Study, jobs: dict[str, Job]) -> str:
     """Digest of a study's dataset: of the study's files, the results of its stages and the code."""
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]

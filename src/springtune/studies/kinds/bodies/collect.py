@@ -12,7 +12,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
 from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.problem.status import Status
-from springtune.reference.answers import beyond_linear, interpolate, objection, outline
+from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
 from ...config.model import Reference, keeps_fields
@@ -70,10 +70,14 @@ def _mesh_row(mesh):
 
 
 def _network_row(arrays):
-    """Values of a network from its stored arrays."""
-    x, y = arrays["displacements"].T
-    row = {"displacement_x": x, "displacement_y": y, "spring_force": arrays["spring_forces"]}
-    return row | {"stiffness": arrays["spring_stiffnesses"]}
+    """Values of a network, and of its reference at the particles, from its stored arrays."""
+    row = {}
+    for name, stored in (("displacement", "displacements"), ("particle_reference", "reference_displacements")):
+        if stored in arrays:
+            row[f"{name}_x"], row[f"{name}_y"] = arrays[stored].T
+    if "displacements" in arrays:
+        row |= {"spring_force": arrays["spring_forces"], "stiffness": arrays["spring_stiffnesses"]}
+    return row
 
 
 def _outline_row(points, moved):
@@ -279,7 +283,7 @@ def _face_reference_rows(study, folder, kinds):
 
 
 def _rest_rows(study, folder):
-    """Rows of meshes, outlines, and references at particles, for the scenes with stored fields."""
+    """Rows of meshes, and of outlines of references, for the scenes with stored fields."""
     shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
     meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
     yield from (mesh.labels | _mesh_row(found.mesh) for mesh, found in meshes.items() if found)
@@ -294,11 +298,7 @@ def _rest_rows(study, folder):
         result = _reference(study, folder, one, ["x", "y", "displacements"])
         if "x" not in result:
             continue
-        x, y, moved = result["x"], result["y"], one.force * result["displacements"]
-        yield labels | _outline_row(*outline(x, y, moved))
-        if found := meshes[scene.mesh]:
-            along = interpolate(x, y, moved, found.mesh.points).T
-            yield labels | dict(zip(("particle_reference_x", "particle_reference_y"), along))
+        yield labels | _outline_row(*outline(result["x"], result["y"], one.force * result["displacements"]))
 
 
 # -- shapes ------------------------------------------------------------------------------------------------------------

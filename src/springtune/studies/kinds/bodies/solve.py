@@ -129,6 +129,8 @@ def solve_beam(beam, sheet, field, task):
         "solver": found.factor.name if found.factor else "",
         "load_share": found.load_share if kinematics == "nonlinear" else np.nan,
     }
+    if wanted is not None and task.get("keep_fields"):
+        result["reference_displacements"] = force * wanted
     if not found.converged:
         last = {} if found.last is None else {"last_displacement": sheet.displacement(kind, found.last)}
         return result | last
