@@ -37,7 +37,7 @@ class Output:
     figures: Callable[[Study], Mapping[str, Mapping[str, object]]] = lambda study: {}  # selected labels, by file stem
     collect: str = ""  # module with `groups(study, folder)`, further groups of the dataset
     plot: str = ""  # function that yields stem, plotting function and selection of each figure of a tree
-    job: str = ""  # outputs may share a job; by default each has its own
+    job: str = "further"  # outputs share a job, which starts and opens the dataset in as much time as ten figures take
     tables: Callable[[Study], Iterable[str]] = lambda study: []  # file names
     write: str = ""  # function of a tree and a folder that writes the tables and returns their names
     into: str = "tables"  # folder of the tables

@@ -31,7 +31,7 @@ def output_jobs(study: Study) -> dict[str, list[Output]]:
     found: dict[str, list[Output]] = {}
     for one in outputs().values():
         if one.name in study.outputs and output_files(one, study):
-            found.setdefault(f"{PRESENT}_{one.job or one.name}", []).append(one)
+            found.setdefault(f"{PRESENT}_{one.job}", []).append(one)
     return found
 
 

@@ -119,6 +119,7 @@ OUTPUTS = (
         "sensitivity curves",
         figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, map(study.labels, study.curves)),
         plot=f"{PLOTS}:sensitivity",
+        job="sensitivity",
         usual=True,
     ),
     Output(
@@ -167,6 +168,7 @@ OUTPUTS = (
         "errors and deformed networks of shapes, and the group `/shape_fields`",
         figures=lambda study: shape_figures(_shape_cases(study)),
         plot="studies.kinds.bodies.shape_figures:shapes",
+        job="shapes",
         usual=True,
     ),
 )

@@ -30,7 +30,6 @@ OUTPUTS = (
         "Sobol indices",
         figures=_figures,
         plot="studies.kinds.samples.figures:sobol",
-        job="samples",
         shows="sampled scenes",
         lack=_lack,
     ),
