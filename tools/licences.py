@@ -46,6 +46,7 @@ OWN = {
     "ptyprocess": "ISC",
     "pycparser": "BSD-3-Clause",
     "pygeoif": "LGPL-2.1-or-later",
+    "pypdfium2": "BSD-3-Clause or Apache-2.0",
     "pyreadline3": "BSD-3-Clause",
     "pyudunits2": "BSD-3-Clause",
     "scikit-fem": "BSD-3-Clause",

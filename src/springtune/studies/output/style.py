@@ -165,7 +165,8 @@ def png_and_pdf(figure: Figure) -> dict[str, bytes]:
             figure.set_layout_engine(None)  # which would draw everything once more
         figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
     with pypdfium2.PdfDocument(pdf.getvalue()) as document:
-        picture = document[0].render(scale=PIXELS_PER_INCH / POINTS_PER_INCH).to_pil()
+        scale = (1 - 1e-6) * PIXELS_PER_INCH / POINTS_PER_INCH  # pdfium rounds the numbers of pixels up
+        picture = document[0].render(scale=scale).to_pil()
     # Higher levels take twice the time for a tenth of the size.
     picture.save(png, format="png", dpi=(PIXELS_PER_INCH, PIXELS_PER_INCH), compress_level=1)
     return {"png": png.getvalue(), "pdf": pdf.getvalue()}
