@@ -350,9 +350,25 @@ def test_it_rests(period, window):
     assert found.displacements[1, 0] == pytest.approx(1, abs=1e-7) and 80 <= found.frames <= 160
 
 
-def test_nothing_moves():
-    found = followed(lambda t: 0.0)
-    assert found.status == "rest" and found.frames == 40
+ENDED = {
+    # displacement of a frame, options, and the end: its status, words, and frames at most
+    "nothing": (lambda t: 0.0, {}, "rest", "", 40),
+    "trembling below the tolerance": (lambda t: 1 - np.exp(-t / 5) + 4e-8 * np.sin(1.7 * t), {}, "rest", "", 400),
+    "a pause": (lambda t: np.clip(t, 0, 20) + max(0, t - 45), {"most": 60}, "moving", "", 60),
+    "a swing": (lambda t: 1 - np.exp(-t / 200) * np.cos(2 * np.pi * t / 17), {"most": 300}, "moving", "", 300),
+    "growth": (lambda t: 1.1**t, {}, "diverged", "more substeps", 600),
+    "no number": (lambda t: np.nan if t > 30 else 0.1 * t, {}, "diverged", "more substeps", 600),
+} | {
+    f"{most} frames": (lambda t: 1 - np.exp(-t / 5), {"most": most}, "moving", f"not at rest after {most} frames", most)
+    for most in (1, 9, 15)
+}
+
+
+@pytest.mark.parametrize(("function", "options", "status", "said", "frames"), ENDED.values(), ids=ENDED)
+def test_how_a_session_ends(function, options, status, said, frames):
+    found = followed(function, **options)
+    assert found.status == status and said in found.message and found.frames <= frames
+    assert np.isnan(found.displacements).all() == np.isnan(found.swing) == (status == "diverged")
 
 
 @pytest.mark.parametrize("slow", [1e3, 1e5])
@@ -363,17 +379,6 @@ def test_a_creep_is_no_rest(slow):
     assert found.status == "moving" and "not at rest after 400 frames" in found.message
     ended = followed(lambda t: 1 - np.exp(-t / 5) - share * np.exp(-t / slow), most=10**6, tolerance=2 * share)
     assert ended.status == "rest" and abs(ended.displacements[1, 0] - 1) < 2 * share
-
-
-def test_a_pause_is_no_rest():
-    found = followed(lambda t: np.clip(t, 0, 20) + max(0, t - 45), most=60)
-    assert found.status == "moving" and found.displacements[1, 0] == 35
-
-
-@pytest.mark.parametrize("most", [1, 9, 15])
-def test_a_run_of_a_window_or_two_tells_that_it_moves(most):
-    found = followed(lambda t: 1 - np.exp(-t / 5), most=most)
-    assert found.status == "moving" and found.frames == most and f"not at rest after {most} frames" in found.message
 
 
 @pytest.mark.parametrize("window", [2, 3, 10])
@@ -387,24 +392,6 @@ def test_it_swings(periods, window):
     assert found.status == "swings" and "take more substeps or damping" in found.message
     assert found.displacements[1, 0] == pytest.approx(1, abs=2e-3)
     assert found.swing == pytest.approx(np.ptp(swing) / 2, rel=0.1)
-
-
-def test_a_swing_on_its_way_to_rest_is_moving():
-    found = followed(lambda t: 1 - np.exp(-t / 200) * np.cos(2 * np.pi * t / 17), most=300)
-    assert found.status == "moving"
-
-
-def test_trembling_by_less_than_the_tolerance_is_rest():
-    """As rounding does."""
-    found = followed(lambda t: 1 - np.exp(-t / 5) + 4e-8 * np.sin(1.7 * t))
-    assert found.status == "rest" and found.frames < 400
-
-
-def test_it_diverges():
-    for function in (lambda t: 1.1**t, lambda t: np.nan if t > 30 else 0.1 * t):
-        found = followed(function)
-        assert found.status == "diverged" and np.isnan(found.displacements).all() and np.isnan(found.swing)
-        assert "diverged within" in found.message and "more substeps" in found.message
 
 
 def test_a_scene_that_swings_in_an_engine():

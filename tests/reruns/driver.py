@@ -2,21 +2,19 @@
 
 import contextlib
 import json
-import re
 import shutil
 import sys
 from pathlib import Path
 
 import meshio
 import numpy as np
-import xarray as xr
 
 sys.path.append(str(Path(__file__).parents[1] / "support"))  # for `campaigns`, where this is a program
 
 import springtune as st
 from springtune.studies.runs import attempts, rerun
 
-from campaigns import Campaign
+from campaigns import Campaign, held
 
 HERE = Path(__file__).parent
 CONFIG = Path("small.yaml")
@@ -27,9 +25,6 @@ table,beam,mesh_type,mesh_size_mm,material,load,force_N,stiffness_N_per_m,\
 reference_displacement_mm,displacement_mm,deformation_error_percent,remark
 1,a,structured,5,steel,traction,1000,170e6,0.01,0.011,10,
 """
-
-TIMES = re.compile("seconds|created|history|git_")
-"""Names of values that are others in every run or checkout."""
 
 
 class Run(Campaign):
@@ -89,17 +84,7 @@ def write_mesh(path, shift=0.0):
 
 def dataset(folder):
     """What the dataset of a study holds, without times."""
-    with xr.open_datatree(folder / FOLDER / rerun.DATASET, engine="h5netcdf", decode_cf=False) as tree:
-        nodes = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
-    return {path: _without_times(data) for path, data in nodes.items()}
-
-
-def _without_times(data):
-    found = {name: str(one) for name, one in data.attrs.items() if not TIMES.search(name)}
-    for name, array in data.variables.items():
-        if not TIMES.search(name):
-            found[name] = (array.dims, array.values.tolist() if array.dtype.kind in "OU" else array.values.tobytes())
-    return found
+    return held(folder / FOLDER / rerun.DATASET)
 
 
 if __name__ == "__main__":  # with the package of another folder

@@ -1,8 +1,10 @@
 """Studies of `studies.yaml`, what their reader says, and their jobs, done in this process in the order of a run."""
 
+import re
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 import springtune as st
 from springtune.studies.kinds import collect
@@ -11,6 +13,9 @@ from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import attempts, job, rerun
 from springtune.studies.runs.plan import plan
+
+TIMES = re.compile("seconds|created|history|git_")
+"""Names of values that are others in every run or checkout."""
 
 EVERY = {"sensitivity": ("reference",), "calibrate": ("sensitivity",), "solve": ("reference", "calibrate")}
 """Stages that a stage needs all jobs of, as the rules in ``workflow/rules/stages.smk`` have it."""
@@ -34,6 +39,20 @@ def do_stages(study, folder, *stages):
     for one in plan(study, folder).values():
         if not stages or one.stage.name in stages:
             attempts.do_tasks(one.stage.module, one.content)
+
+
+def held(path):
+    """What a dataset holds, without times: attributes, and values and dimensions of variables, by group."""
+    with xr.open_datatree(path, engine="h5netcdf", decode_cf=False) as tree:
+        nodes = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
+    found = {}
+    for place, data in nodes.items():
+        found[place] = {name: str(one) for name, one in data.attrs.items() if not TIMES.search(name)}
+        for name, array in data.variables.items():
+            if not TIMES.search(name):
+                values = array.values.tolist() if array.dtype.kind in "OU" else array.values.tobytes()
+                found[place][name] = (array.dims, values)
+    return found
 
 
 class Campaign:

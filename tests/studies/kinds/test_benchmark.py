@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.linalg.factors import SingularError
-from springtune.mechanics.network import Network
-from springtune.mechanics.statics import StaticProblem
-from springtune.problem.boundary import held, weights
-from springtune.problem.loads import AXIAL
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
-from springtune.springs.lattice import half_weight
 from springtune.studies.kinds.benchmark import OTHER_APPROACHES, approach_names
 from springtune.studies.kinds.benchmark import solve as benchmark
 from springtune.studies.kinds.benchmark.approaches import APPROACHES
@@ -147,33 +141,3 @@ def test_beyond_its_seconds_an_approach_is_not_run_on_finer_sizes():
 def test_explicit_steps_have_a_rate():
     rows = [*benchmark.explicit(SCENES["traction"], (5e-3,), updates=1)]
     assert (group_of(KIND).of_rows(axes((), (5e-3,)), rows).spring_updates > 0).all()
-
-
-# -- what makes it fast ------------------------------------------------------------------------------------------------
-
-
-def test_multigrid_gives_what_the_factorization_gives():
-    mesh = st.MESH_TYPES["structured"](0.2, 0.04, 2e-3)
-    pattern = weights(mesh, AXIAL)
-    answers = []
-    for solver in ("SuperLU", "multigrid"):
-        problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh), solver=solver), pattern)
-        found = problem.linear(1e-3)
-        assert found.converged and problem.judge(1e-3, found)[0] is st.Status.SOLVED
-        answers.append((found.factor.name, float(np.tensordot(found.displacements, pattern, axes=2))))
-    assert [name for name, _ in answers] == ["SuperLU", "multigrid"]
-    assert answers[1][1] == pytest.approx(answers[0][1], rel=1e-9)
-
-
-def test_multigrid_refuses_a_network_beyond_its_buckling_load():
-    mesh = st.MESH_TYPES["structured"](0.2, 0.01, 2e-3)
-    problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh)), weights(mesh, AXIAL))
-    bent = 5e-3 * problem.slope / np.abs(problem.slope).max() * -1
-    assert problem.network.factorize_tangent(bent).negative_pivots > 0
-    network = Network(mesh, held(mesh, AXIAL), half_weight(mesh), solver="multigrid")
-    factor = network.factorize_tangent(bent)
-    across = problem.network.reduce(np.stack([0 * mesh.points[:, 0], mesh.points[:, 0] ** 2], axis=1))
-    with pytest.raises(SingularError):
-        factor.solve(across)
-    assert factor.negative_pivots == 1  # without being shown where to look
-    assert network.factorize_tangent(0.01 * bent).negative_pivots == 0

@@ -1,7 +1,5 @@
 """The dataset's form: dimensions, units, holes, what CF checkers say, and that a file is there whole or not at all."""
 
-import os
-import shutil
 import subprocess
 
 import h5py
@@ -12,7 +10,6 @@ import xarray as xr
 import springtune as st
 from cf import complaints
 from springtune.registry import import_name
-from springtune.safe_io import atomic
 from springtune.studies.config.kind import modules
 from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
@@ -158,32 +155,14 @@ class TestProvenance:
         assert known["git_commit"] == "f00d"
 
 
-def write_curves(path, value):
-    """Write a dataset of some MB: a value, and numbers that cannot be compressed."""
-    axes = AXES | {"beam": tuple("abcdefgh"), "stiffness_ratio": tuple(range(20000))}
-    data = SENSITIVITY.empty(axes)
-    data["displacement"].values[:] = value
-    data["stiffness"].values[:] = np.random.default_rng(0).random(data.stiffness.shape)
-    dataset.write(path, {"/": data}, VERSION)
-
-
-class TestInterruptedWrite:
+def test_an_unfinished_file_is_no_dataset(tmp_path):
     """Kills wherever a file is renamed, and full disks of a whole run, are tests/reruns/test_faults.py's."""
-
-    CROWDED = "import sys, resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
-    CROWDED += "from test_dataset import write_curves; write_curves(sys.argv[1], 2.0)"
-
-    def test_an_unfinished_file_is_no_dataset(self, tmp_path):
-        write_curves(tmp_path / "dataset.nc", 1.0)
-        whole = (tmp_path / "dataset.nc").read_bytes()
-        os.remove(tmp_path / "dataset.nc")
-        unfinished = tmp_path / "dataset.nc.99999999.unfinished"
-        for share in (0.0, 0.1, 0.5, 0.999):
-            unfinished.write_bytes(whole[: int(share * len(whole))])
-            with pytest.raises(FileNotFoundError, match="there is no such dataset"):
-                st.open(tmp_path)
-            shutil.copy(unfinished, tmp_path / "cut.nc")
-            with pytest.raises(ValueError, match="cannot be read"):
-                st.open(tmp_path / "cut.nc")
-        atomic.remove_unfinished(tmp_path)
-        assert not unfinished.exists()
+    dataset.write(tmp_path / "dataset.nc", {"/": SENSITIVITY.empty(AXES)}, VERSION)
+    whole = (tmp_path / "dataset.nc").read_bytes()
+    (tmp_path / "dataset.nc").rename(tmp_path / "dataset.nc.99999999.unfinished")
+    with pytest.raises(FileNotFoundError, match="there is no such dataset"):
+        st.open(tmp_path)
+    for share in (0.0, 0.1, 0.5, 0.999):
+        (tmp_path / "cut.nc").write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(ValueError, match="cannot be read"):
+            st.open(tmp_path / "cut.nc")

@@ -62,19 +62,18 @@ class TestClaims:
             "call: springtune run config/mine.yaml --results FOLDER"
         )
 
-    @pytest.mark.parametrize("given", ["w/mine.yaml", "./w/mine.yaml", "{here}/w/mine.yaml", "link.yaml"])
-    def test_the_same_study_by_another_path_is_not(self, given):
-        Path("link.yaml").symlink_to("w/mine.yaml")
-        Path("w/mine.yaml").write_text("title: edited\n")
-        locks.check_claim(STUDY, Path(given.format(here=Path.cwd())))
-
-    def test_the_same_content_elsewhere_is_not(self):
-        Path("config/mine.yaml").write_bytes(Path("w/mine.yaml").read_bytes())
-        locks.check_claim(STUDY, Path("config/mine.yaml"))
-
-    def test_a_config_that_was_moved_is_not(self):
-        Path("w/mine.yaml").replace("config/mine.yaml")
-        locks.check_claim(STUDY, Path("config/mine.yaml"))
+    @pytest.mark.parametrize("how", ["by its path", "./", "from the root", "by a link", "the same content", "moved"])
+    def test_the_same_study_is_not(self, how):
+        here, other = Path("w/mine.yaml"), Path("config/mine.yaml")
+        Path("link.yaml").symlink_to(here)
+        if how == "the same content":
+            other.write_bytes(here.read_bytes())
+        elif how == "moved":
+            here.replace(other)
+        else:
+            here.write_text("title: edited\n")
+        given = {"by its path": here, "./": "./w/mine.yaml", "from the root": here.absolute(), "by a link": "link.yaml"}
+        locks.check_claim(STUDY, Path(given.get(how, other)))
 
     def test_commands_know_the_study_of_a_folder(self):
         (STUDY / "dataset.nc").touch()
