@@ -98,28 +98,6 @@ def test_energies_in_single_precision(case):
     assert single == pytest.approx(double, rel=1e-3)
 
 
-REFUSED = {
-    "area": (
-        MATERIALS["foam"],
-        "areas have a negative modulus: springs alone have a Poisson's ratio of 1/3, the material a smaller one",
-    ),
-    "yeoh": (st.Rubber([1e5, -2e4, 1e2], **SOFT), "triangles of rubber soften until they have no energy"),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_has_no_positive_compliance_is_refused(case, monkeypatch, tmp_path):
-    (definition, _, name), (material, what) = CASES[case], REFUSED[case]
-    monkeypatch.setitem(MATERIALS, name, material)
-    one = scene(case, share=0.01)
-    said = rf"definition '{definition}': \d+ of \d+ {what}, and no compliance of XPBD is negative; take"
-    with pytest.raises(st.EngineError, match=said):
-        st.in_engine(one, "xpbd")
-    with pytest.raises(ValueError, match=said):
-        one.springs.write(tmp_path / "net.xpbd.json", errors=False)
-    assert not list(tmp_path.iterdir())
-
-
 # -- the file: a solver that is written from what it says ----------------------------------------------------------
 
 

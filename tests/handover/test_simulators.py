@@ -408,45 +408,7 @@ def test_sofas_scene_in_python_serves_versions_with_other_names(tmp_path):
     assert {"pluginName": "Sofa.Component.IntegrationScheme.Backward"} in found["RequiredPlugin"]
 
 
-# -- XPBD --------------------------------------------------------------------------------------------------------------
-
-
 # -- refusals ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("ending", "program"), PROGRAMS.items())
-def test_what_a_simulator_lacks_is_refused_and_nothing_written(ending, program, tmp_path):
-    weightless = st.Material("210 GPa", 0.3, name="ideal")
-    lacking = (
-        (scene(definition="area"), f"definition 'area': has energies of areas.*{program} has no such law; .*'patch'"),
-        (scene(definition="neo-hooke"), f"definition 'neo-hooke': has energies of rubber.*{program}.*such as 'patch'"),
-        (scene(definition="delingette-tensile"), "definition 'delingette-tensile': .*such as 'patch'"),
-    )
-    for one, message in (
-        *(lacking if program != "XPBD" else ()),  # which has them
-        *(
-            (scene(definition=name), f"definition '{name}': has energies of angles.*{program}.*such as 'patch'")
-            for name in ("angular", "ielsm")
-        ),
-        *((scene(definition=name), f"definition '{name}': .*'patch'") for name in ("normal-shear", "many-body")),
-        (scene(material=weightless), f"density: material 'ideal' has none, and {program} moves masses; give a density"),
-        (scene(kinematics="linear"), f"kinematics: 'linear', and springs of {program} keep.*; take 'nonlinear'"),
-        (scene(load="follower-pressure", force="1 kN"), "load 'follower-pressure': turns.*; take 'pressure'"),
-    ):
-        with pytest.raises(ValueError, match=message) as caught:
-            one.springs.write(tmp_path / f"net{ending}", errors=False)
-        assert "\n" not in str(caught.value)
-    assert not list(tmp_path.iterdir())
-
-
-def unstable(mesh, material, thickness):
-    """Springs inside that push harder than those outside pull."""
-    return st.Springs(1e8, np.where(mesh.on_outline, 1.0, -1.0))
-
-
-def test_springs_that_are_unstable_at_rest_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="definition 'unstable': is unstable at rest, .* in MuJoCo; take another"):
-        scene(definition=unstable).springs.write(tmp_path / "net.xml", errors=False)
 
 
 def test_a_load_without_equilibrium_or_with_one_far_away_is_written_and_says_so(tmp_path):
@@ -481,8 +443,6 @@ def holed(load, definition="lattice", material=STEEL, size="4 mm", **options):
         st.LoadCase("pull", rollers, (right,), quantities=(end,)),
         st.LoadCase("press", (fixed,), pressures=(st.Pressure("hole", "20 MPa"),), quantities=(end,)),
         st.LoadCase("weigh", (fixed,), gravity=(1e5, -3e5), quantities=(end,)),
-        st.LoadCase("turn", (fixed,), pressures=(st.Pressure("upper", "1 MPa", True),), quantities=(end,)),
-        st.LoadCase("move", (fixed, st.Support("right", x="0.1 mm")), quantities=(end,)),
     )
     plate = st.Shape.rectangle(
         "60 mm",
@@ -523,21 +483,6 @@ def test_parts_of_shapes_keep_their_masses_in_mujoco(tmp_path):
     moving = model.body_mass[1:].sum()
     assert moving == pytest.approx(one.boundary_problem.masses()[free].sum(), rel=1e-9)
     assert "Other parts are of 'light'." in written(one, tmp_path, ".xml")
-
-
-@pytest.mark.parametrize("ending", PROGRAMS)
-def test_what_no_file_tells_of_shapes_is_refused_and_nothing_written(ending, tmp_path):
-    loads = {
-        "turn": "load 'turn': turns with the side .*give its pressures 'follower: false'",
-        "move": "load 'move': prescribes displacements",
-    }
-    for load, message in loads.items():
-        with pytest.raises(ValueError, match=message):
-            holed(load).springs.write(tmp_path / f"net{ending}", errors=False)
-    bare = st.Material("70 GPa", 0.3, name="bare")
-    with pytest.raises(ValueError, match="density: material 'bare' has none"):
-        holed("pull", material=bare).springs.write(tmp_path / f"net{ending}", errors=False)
-    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("load", ["pull", "press", "weigh"])

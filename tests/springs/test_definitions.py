@@ -13,7 +13,6 @@ from scipy.optimize import nnls
 import springtune as st
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.network import Network
-from springtune.mesh import lattice
 from springtune.springs.element_fit import least_squares
 from springtune.springs.lattice import predicted_stiffness
 
@@ -215,48 +214,13 @@ def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
-# -- patch tests -------------------------------------------------------------------------------------------------------
-
-
 # -- refusals ----------------------------------------------------------------------------------------------------------
 
 
-def slender(ratio, turn=((1, 0), (0, 1))):
-    """Squares with both diagonals made longer along x, and turned."""
-    mesh = st.MESH_TYPES["braced"](0.04, 0.01, 2e-3)
-    return st.Mesh(mesh.points * [ratio, 1] @ turn, mesh.triangles, mesh.quads)
-
-
-@pytest.mark.parametrize(
-    ("name", "mesh", "nu", "message"),
-    [
-        *(
-            (
-                name,
-                st.MESH_TYPES["braced" if one.cells == (3,) else "structured"](0.03, 0.01, 2e-3),
-                0.3,
-                "needs (triangles|rectangles).*mesh type",
-            )
-            for name, one in st.DEFINITIONS.items()
-            if one.cells != (3, 4)
-        ),
-        *((name, slender(2.5), 0.3, "negative stiffness") for name in ("baudet", "flechon", "lattice", "axis-exact")),
-        ("lloyd", slender(2.5), 0.3, r"needs squares.*of 5 x 2 mm"),
-        *(("lloyd", slender(ratio), 0.3, "needs squares") for ratio in (1.025, 0.975)),
-        ("axis-exact", slender(1, [[0.8, 0.6], [-0.6, 0.8]]), 0.3, "sides along x and y"),
-        ("axis-exact", patch("braced"), 0.0, "above 0"),
-        ("axis-exact", st.MESH_TYPES["free"](0.03, 0.01, 2e-3), 0.3, "isosceles"),
-        ("axis-exact", lattice(5, 4, 1e-3), 0.49, r"nu = 0.333 and the material 0.49; use rows of height 0.7143 mm"),
-        ("van-gelder-general", lattice(6, 4, row_height=0.3), 0.5, "negative stiffness.*obtuse"),
-    ],
-)
-def test_meshes_that_a_definition_cannot_have_are_refused(name, mesh, nu, message):
-    with pytest.raises(st.DefinitionError, match=message):
-        st.DEFINITIONS[name].springs(mesh, st.Material(1.0, nu, name="unit"), 1.0)
-
-
 def test_lloyds_squares_may_be_off_by_two_percent():
-    assert st.DEFINITIONS["lloyd"].springs(slender(1.015), st.Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
+    mesh = st.MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    stretched = st.Mesh(mesh.points * [1.015, 1], mesh.triangles, mesh.quads)
+    assert st.DEFINITIONS["lloyd"].springs(stretched, st.Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
 
 
 @pytest.mark.parametrize("name", ["lattice", "patch", "patch-fit", "element-fit", "energy-fit", "area", "delingette"])
@@ -265,17 +229,6 @@ def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
     thin, thick = (st.DEFINITIONS[name].springs(mesh, steel, thickness) for thickness in (1e-3, 3e-3))
     # The product is rounded twice.
     np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-9)
-
-
-@pytest.mark.parametrize("corner", [[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], ids=str)
-def test_quadrilaterals_that_are_no_rectangles_are_refused(corner):
-    """Opposite sides may be equal and diagonals not, as of a sheared square, or the other way round."""
-    square, sheared = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]), np.array([[0, 0], [1, 0], [1.5, 1], [0.5, 1.0]])
-    quads = np.array([[0, 1, 2, 3]])
-    moved = square + [[0, 0], [0, 0], corner, [0, 0]]
-    for points in (moved, sheared, np.array([[0, 0], [1, 0], [0.8, 1], [0.2, 1.0]])):
-        with pytest.raises(st.DefinitionError, match="needs rectangles and the mesh has other quadrilaterals"):
-            st.DEFINITIONS["baudet"].springs(st.Mesh(points, np.zeros((0, 3), int), quads), st.Material(1.0, 0.3), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -297,9 +250,3 @@ def test_predicted_stiffness_is_that_of_the_lattice_less_the_full_outlines(load,
     expected = inside / (1 + excess * np.sqrt(3) / 2 * 5e-3 / 0.04)
     assert predicted_stiffness(material, beam, 5e-3, load) == pytest.approx(expected, rel=1e-9)
     assert all(np.isnan(predicted_stiffness(material, beam, 5e-3, one)) for one in ("pressure", "follower-pressure"))
-
-
-# -- identification ----------------------------------------------------------------------------------------------------
-
-
-# -- the stage ---------------------------------------------------------------------------------------------------------
