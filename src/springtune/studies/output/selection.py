@@ -11,9 +11,9 @@ import xarray as xr
 
 from springtune.problem.geometry import beam_label
 from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
-from springtune.problem.status import Status
 
-from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
+from ..config.model import STRAINED_REFERENCE
+from .answers import OWN_LAW_REFERENCES
 from .error_scale import sign_of_displacements
 
 if TYPE_CHECKING:
@@ -179,9 +179,6 @@ def labelled_beam(data: xr.Dataset, name: str) -> str:
 
 # -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's in its plane ---------
 
-OWN_LAW_REFERENCES = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE)
-"""References of own laws, by priority; the last one of materials in plane strain alone."""
-
 
 def own_law_references(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
     """References of a material's own law, and the group without plane-strain numbers of plane-stress materials."""
@@ -208,19 +205,6 @@ def select_own_law(finite: xr.Dataset) -> xr.Dataset | None:
             own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
             found[name] = array.where(own, found[name])
     return found
-
-
-def valid_errors(data: xr.Dataset, finite: xr.Dataset | None = None) -> xr.DataArray:
-    """Deformation errors of solved cells whose reference applies, NaN elsewhere.
-
-    Those of nonlinear networks are against references at `finite` strain where there are any.
-    """
-    solved = data.status == Status.SOLVED
-    errors = data.deformation_error.where(solved & (data.get("reference_applies", 1) == 1))
-    at_finite_strain = None if finite is None else select_own_law(finite)
-    if at_finite_strain is not None:
-        errors = errors.where(data.kinematics == "linear", at_finite_strain.deformation_error.where(solved))
-    return errors.transpose(*data.deformation_error.dims)
 
 
 def own_law_reference(cell: xr.Dataset, name: str) -> str | None:

@@ -6,19 +6,19 @@ The stage `collect` writes `text` beside the dataset; `info` adds what the file 
 import os
 from collections.abc import Iterator, Mapping
 from html import escape
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from springtune.problem.compare import sign_word
 from springtune.problem.status import Status
 from springtune.safe_io.escapes import shown
 from springtune.safe_io.tables import aligned
 
 from . import reading
-from .selection import select_own_law, valid_errors
-from .text import NOT_ALL_SOLVED, bytes_text, from_json, paragraphs, place_text, range_text, sign_text, without_numbers
+from .answers import Columns, Variables, definition_errors, has_own_law, requested_cells, what_to_type
+from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, place_text, range_text, without_numbers
 
 CELLS_NAMED = 3
 """Cells named for each status; more if fewer than two would remain."""
@@ -43,8 +43,7 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
     rows = [[what, str(sum(found.values())), _count_words(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
     if ROOT_GROUP in groups:
-        root, finite = groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP)
-        lines += [*_errors(root, finite, most), *_stiffness_to_type(root, finite)]
+        lines += _answers(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP), most)
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
@@ -110,67 +109,52 @@ def _cell_lines(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - len(told)} more"
 
 
-def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> Iterator[str]:
+def _answers(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> Iterator[str]:
+    """Errors of definitions, and what to type."""
+    if "definition" in root.get("deformation_error", root).dims:
+        own, other = _variables(root), None if finite is None else _variables(finite)
+        cells = requested_cells(own, other)
+        yield from _errors(cells, root, other, most)
+        yield from _stiffness_to_type(cells)
+
+
+def _variables(data: xr.Dataset) -> Variables:
+    return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
+
+
+def _errors(cells: Columns, root: xr.Dataset, finite: Variables | None, most: int | None) -> Iterator[str]:
     """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
-    if "definition" not in root.get("deformation_error", root).dims:
-        return
-    errors = valid_errors(root, finite)
-    by = [name for name in ("definition", "kinematics") if name in errors.dims]
-    found = []
-    for labels in product(*(errors[name].values.tolist() for name in by)):
-        cell = dict(zip(by, labels))
-        own, here = root.sel(cell), errors.sel(cell)
-        sizes = np.abs(here.values)
-        if np.isfinite(sizes).any():
-            place = [int(at) for at in np.unravel_index(np.nanargmax(sizes), sizes.shape)]
-            worst = float(here.values[tuple(place)])
-            numbers = [f"{100 * np.nanmedian(sizes):.3g} %", f"{100 * worst:+.3g} %"]
-            word, where = sign_text(own, worst, here.dims, place), place_text(own, here.dims, place)
-            found.append((abs(worst), [*labels, int(np.isfinite(sizes).sum()), *numbers, word, where]))
-    found.sort(key=lambda row: -row[0])
+    found = sorted(definition_errors(cells), key=lambda one: -one.errors.max())
     if found:
         yield from (
             "",
             "deformation errors, (network - reference) / |reference|, of solved scenes within the reference",
         )
-        if finite is not None and select_own_law(finite) is not None:
+        if finite is not None and has_own_law(finite):
             yield "  nonlinear networks against finite strain, linear ones against small strain"
+        by = [name for name in ("definition", "kinematics") if name in cells]
+        others = [str(name) for name in root.status.dims if name not in by]
+        units = {name: str(root[name].attrs.get("units", "1")) for name in others}
+        rows = []
+        for one in found[:most]:
+            worst, place = float(cells["valid_error"][one.worst]), {name: cells[name][one.worst] for name in others}
+            word = sign_word(worst, float(cells["reference_displacement"][one.worst]))
+            numbers = [f"{100 * one.median:.3g} %", f"{100 * worst:+.3g} %"]
+            rows.append([*one.labels, len(one.errors), *numbers, word, cell_text(place, units)])
         heads = [*by, "scenes", "median", "worst", "", "at"]
-        right = range(len(by), len(by) + 3)
-        yield from aligned([heads, *(row for _, row in found[:most])], 2, right).splitlines()
+        yield from aligned([heads, *rows], 2, range(len(by), len(by) + 3)).splitlines()
     if most is not None and len(found) > most:
-        yield f"  and of {len(found) - most} more at most {100 * found[most][0]:.2f} %"
+        yield f"  and of {len(found) - most} more at most {100 * found[most].errors.max():.2f} %"
 
 
-def _stiffness_to_type(root: xr.Dataset, finite: xr.Dataset | None) -> Iterator[str]:
+def _stiffness_to_type(cells: Columns) -> Iterator[str]:
     """What to type on the finest mesh of each type and material: of the best definition and the best uniform one."""
-    if not {"stiffness_inside", "deformation_error"} <= {*root}:
-        return
-    errors, rows = abs(valid_errors(root, finite)), []
-    for mesh_type, material in product(root.mesh_type.values.tolist(), root.material.values.tolist()):
-        place = {"mesh_type": mesh_type, "material": material}
-        known = errors.sel(place).dropna("mesh_size", how="all")
-        if not known.size:
-            continue
-        size = known.mesh_size.values.min()
-        own, off = root.sel(place).sel(mesh_size=size), known.sel(mesh_size=size)
-        membrane = own.material_young_modulus * own.beam_thickness
-        typed = own.stiffness_inside.notnull() | own.stiffness_outline.notnull()
-        off = off.where(typed.transpose(*off.dims))
-        medians = {name: np.nanmedian(one) for name in off.definition.values.tolist()
-                   if np.isfinite(one := off.sel(definition=name).values).any()}  # fmt: skip
-        uniform = {name for name in medians if own.stiffness.sel(definition=name).notnull().any()}
-        for names in ({*medians} - uniform, uniform):
-            if not names:
-                continue
-            best = min(sorted(names), key=medians.__getitem__)
-            found = own.sel(definition=best)
-            parts = (found[f"stiffness_{part}"].values for part in ("inside", "outline"))
-            sides = [range_text(values[np.isfinite(values)]) for values in parts]
-            shares = (found.stiffness_inside / membrane).values
-            ratio = f"{np.nanmedian(shares):.3g}" if np.isfinite(shares).any() else ""
-            rows.append([best, mesh_type, material, f"{1e3 * size:.4g} mm", *sides, ratio,
-                         f"{100 * medians[best]:.2g} %"])  # fmt: skip
+    rows = [
+        [one.definition, *one.labels, f"{1e3 * one.mesh_size:.4g} mm", range_text(one.inside), range_text(one.outline),
+         f"{one.ratio:.3g}" if np.isfinite(one.ratio) else "", f"{100 * one.median_error:.2g} %"]
+        for answers in what_to_type(cells)
+        for one in answers
+    ]  # fmt: skip
     if rows:
         yield from ("", "what to type [N/m], on the finest mesh: the best definition, and the best uniform stiffness")
         heads = ["definition", "mesh type", "material", "size", "inside", "outline", "inside / E t", "median error"]

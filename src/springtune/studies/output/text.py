@@ -66,16 +66,6 @@ def place_text(data: "xr.Dataset", dims: Iterable[Hashable], place: Iterable[int
     return cell_text({name: at if axis is None else axis.values[at] for name, axis, at in pairs}, units)
 
 
-def sign_text(data: "xr.Dataset", error: float, dims: Iterable[Hashable], place: Iterable[int]) -> str:
-    """Word for the sign of the deformation error of a cell, see `springtune.problem.compare.sign_word`."""
-    if "reference_displacement" not in data:
-        return ""
-    from springtune.problem.compare import sign_word  # here, since it imports numpy
-
-    known, at = data.reference_displacement, dict(zip(dims, place))
-    return sign_word(error, float(known.isel({name: at[name] for name in known.dims})))
-
-
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
 
 

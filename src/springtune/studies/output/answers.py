@@ -1,0 +1,131 @@
+"""Answers of a study, for its summary and its page: errors of definitions, and what to type. By numpy alone."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from springtune.problem.status import Status
+
+from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
+
+OWN_LAW_REFERENCES = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE)
+"""References of own laws, by priority; the last one of materials in plane strain alone."""
+
+Variables = Mapping[str, tuple[Sequence[str], np.ndarray]]
+"""Dimensions and values of a group's variables and labels."""
+
+Columns = dict[str, np.ndarray]
+"""Labels and values of cells, arrays of one dimension."""
+
+
+def broadcast(dims: Sequence[str], own: Sequence[str], values: np.ndarray) -> np.ndarray:
+    """Values over their `own` dimensions with an axis for each of `dims`, of length 1 where they have none."""
+    values = values.transpose([own.index(name) for name in dims if name in own])
+    return values[tuple(slice(None) if name in own else None for name in dims)]
+
+
+def requested_cells(group: Variables, finite: Variables | None = None, error: str = "deformation_error") -> Columns:
+    """Requested cells of a group; their `valid_error` is NaN unless they are solved and their reference applies.
+
+    Errors of nonlinear networks are against references at `finite` strain where there are any.
+    """
+    dims, values = group[error]
+    there = broadcast(dims, *group["status"]) != Status.NOT_REQUESTED
+    places = dict(zip(dims, np.nonzero(np.broadcast_to(there, values.shape))))
+    cells = {}
+    for name, (own, values) in group.items():
+        if own and {*own} <= {*dims}:
+            cells[name] = values[tuple(places[one] for one in own)]
+    valid = cells[error]
+    if "reference_applies" in cells:
+        valid = np.where(cells["reference_applies"] == 1, valid, np.nan)
+    if finite and has_own_law(finite):
+        valid = np.where(cells["kinematics"] == "linear", valid, _own_law_errors(finite, places))
+    cells["valid_error"] = np.where(cells["status"] == Status.SOLVED, valid, np.nan)
+    return cells
+
+
+def has_own_law(finite: Variables) -> bool:
+    """Whether a group of references at finite strain has one of a material's own law."""
+    return "reference" in finite and bool({*OWN_LAW_REFERENCES} & {*finite["reference"][1].tolist()})
+
+
+def _own_law_errors(finite: Variables, places: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Errors of cells against the reference of their material's own law and plane."""
+    laws, found = finite["reference"][1].tolist(), np.array(np.nan)
+    for law in (one for one in reversed(OWN_LAW_REFERENCES) if one in laws):
+        at = {name: values[tuple(places.get(one, laws.index(law)) for one in own)]
+              for name, (own, values) in finite.items() if {*own} <= {*places, "reference"}}  # fmt: skip
+        known = np.isfinite(at["reference_displacement"])
+        if law == STRAINED_REFERENCE and "material_plane" in at:
+            known = known & (at["material_plane"] == "strain")
+        found = np.where(known, at["deformation_error"], found)
+    return found
+
+
+class DefinitionErrors(NamedTuple):
+    """Sizes of the errors of a definition, and the place of the largest among the cells."""
+
+    labels: tuple[str, ...]  # definition, and kinematics where a study has them
+    errors: np.ndarray
+    worst: int
+
+    @property
+    def median(self) -> float:
+        """Median size."""
+        return float(np.median(self.errors))
+
+
+def definition_errors(cells: Columns) -> list[DefinitionErrors]:
+    """Valid errors of each definition and kinematics, in the order of the cells."""
+    sizes, found = np.abs(cells["valid_error"]), []
+    by = [cells[name] for name in ("definition", "kinematics") if name in cells]
+    for labels in dict.fromkeys(zip(*(column.tolist() for column in by))):
+        own = np.isfinite(sizes) & np.all([column == label for column, label in zip(by, labels)], axis=0)
+        if own.any():
+            found.append(DefinitionErrors(labels, sizes[own], int(np.argmax(np.where(own, sizes, -1.0)))))
+    return found
+
+
+class Answer(NamedTuple):
+    """What to type for a definition on a mesh: different stiffnesses [N/m] of its springs, sorted."""
+
+    labels: tuple[str, ...]  # of the mesh type and material
+    mesh_size: float
+    definition: str
+    inside: np.ndarray
+    outline: np.ndarray
+    ratio: float  # median inside over E t
+    errors: np.ndarray  # of the scenes
+
+    @property
+    def median_error(self) -> float:
+        """Median size of the errors."""
+        return float(np.median(np.abs(self.errors)))
+
+
+def what_to_type(cells: Columns, by: Sequence[str] = ("mesh_type", "material")) -> Iterator[tuple[Answer, ...]]:
+    """The best definition and the best uniform stiffness, where known, on the finest mesh of each type and material."""
+    if "stiffness_inside" not in cells:
+        return
+    missing = np.full(cells["status"].shape, np.nan)
+    known, uniform = np.isfinite(cells["valid_error"]), np.isfinite(cells.get("stiffness", missing))
+    inside, outline = cells["stiffness_inside"], cells["stiffness_outline"]
+    ratio = inside / cells.get("material_young_modulus", missing) / cells.get("beam_thickness", missing)
+    known &= np.isfinite(inside) | np.isfinite(outline)
+    for labels in dict.fromkeys(zip(*(cells[name].tolist() for name in by))):
+        here = np.all([cells[name] == label for name, label in zip(by, labels)], axis=0)
+        if not (here & known).any():
+            continue
+        size = float(cells["mesh_size"][here & known].min())
+        here &= cells["mesh_size"] == size
+        answers: dict[bool, list[Answer]] = {False: [], True: []}
+        for name in sorted({*cells["definition"][here & known].tolist()}):
+            own = here & (cells["definition"] == name)
+            springs, edges = (np.unique(values[own & np.isfinite(values)]) for values in (inside, outline))
+            share = ratio[own & np.isfinite(ratio)]
+            median = float(np.median(share)) if share.size else np.nan
+            errors = cells["valid_error"][own & known]
+            answers[bool(uniform[own].any())].append(Answer(labels, size, name, springs, edges, median, errors))
+        yield tuple(min(group, key=lambda one: one.median_error) for group in answers.values() if group)
