@@ -132,6 +132,23 @@ def test_numbers_are_those_of_the_dataset(browser, small):
                 )
 
 
+@pytest.mark.parametrize("width", [400, 800, 1440])
+def test_it_opens_on_an_overview_as_wide_as_the_screen(browser, small, width):
+    browser.resize(width)
+    browser.open(small, view="")
+    assert browser.ask("return springtune.opened") == "overview"
+    assert browser.ask("return document.documentElement.scrollWidth") <= width
+    said = text(browser, "#overview")
+    assert "Errors of scenes by definition" in said and "Errors of scenes over run time" in said
+    # Names and numbers of the dots stand beside the chart, and no line leaves its axes.
+    box = "const r = one.getBoundingClientRect(); return [r.left, r.right]"
+    ends = f"return [...document.querySelectorAll('#overview .rows span:not(.x)')].map((one) => {{ {box} }})"
+    assert all(0 <= left < right <= width for left, right in browser.ask(ends))
+    lines = "return [...document.querySelectorAll('#overview polyline')].map((one) => one.getAttribute('points'))"
+    numbers = [float(one) for line in browser.ask(lines) for one in line.replace(",", " ").split()]
+    assert numbers and 0 <= min(numbers) <= max(numbers) <= 100
+
+
 def test_hostile_texts_are_shown_as_texts(browser, small):
     browser.open(small)
     assert browser.driver.title == "<script>alert(1)</script>"
@@ -215,7 +232,7 @@ class TestWhatIsSo:
 
     def test_a_study_without_cells_opens_on_what_it_has(self, browser, samples_alone):
         browser.open(samples_alone)
-        assert browser.ask("return springtune.opened") == "samples" and "cells" not in views(browser)
+        assert browser.ask("return springtune.opened") == "overview" and "cells" not in views(browser)
         assert "Samples: ● solved" in text(browser, "#holds") and not text(browser, "#end")
 
     def test_cells_beyond_the_linear_reference_are_marked(self, browser, odd):

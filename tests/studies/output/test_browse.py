@@ -13,7 +13,9 @@ from test_dataset import GROUPS
 
 import springtune as st
 from springtune.cli import main
+from springtune.problem.status import Status
 from springtune.studies.config.kind import kinds
+from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.samples.designs import PARAMETERS
 from springtune.studies.output.browse.page import packed, page, views
@@ -101,6 +103,57 @@ class TestPage:
                 assert {plot.value, plot.x, *beside} <= set(variables) | dimensions, plot.title
                 assert {plot.by, plot.along} - {""} <= dimensions, plot.title
                 assert set(plot.selection) <= dimensions, plot.title
+
+
+class TestOverview:
+    """What the page says first, without a script."""
+
+    AXES = {
+        "beam": ("100x20",), "mesh_type": ("free",), "mesh_size": (1e-3, 5e-3), "material": ("steel",),
+        "load": ("traction",), "definition": ("paper", "patch", "neo-hooke"), "kinematics": ("linear",),
+        "stiffness_ratio": (1.0,),
+    }  # fmt: skip
+
+    def said(self, tmp_path, rows):
+        """Text of the overview of scenes on one beam."""
+        known = {name: labels[0] for name, labels in self.AXES.items() if name != "stiffness_ratio"}
+        body = {"beam": "100x20", "material": "steel", "material_young_modulus": 2e11, "beam_thickness": 1e-3}
+        reference = body | {"load": "traction", "kinematics": "linear"}
+        reference |= {"reference_displacement": 1e-3, "reference_applies": 1}
+        tree = xr.DataTree(ROOT.of_rows(self.AXES, [reference, *(known | row for row in rows)]))
+        tree.attrs = {"springtune_version": springtune.__version__, "study": "mine", "title": TITLE}
+        tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
+        text = page(tmp_path / "dataset.nc")
+        found = re.search(r'<section id="overview".*?</section>\n<noscript>', text, re.DOTALL)[0]
+        return " ".join(re.sub(r"<[^>]*>", "", found.replace("</span>", " ")).split())
+
+    def solved(self, definition, error, inside, outline, **more):
+        """Row of a solved scene."""
+        stiffnesses = {"stiffness_inside": inside, "stiffness_outline": outline}
+        seconds = {"solve_seconds": 0.01, "definition_seconds": 0.002}
+        known = {"definition": definition, "status": Status.SOLVED, "deformation_error": error}
+        return known | stiffnesses | seconds | more
+
+    def test_what_to_type_is_of_the_finest_mesh_and_the_best_springs(self, tmp_path):
+        said = self.said(tmp_path, [
+            self.solved("paper", -0.2, 1.7e8, 1.7e8, stiffness=1.7e8),
+            self.solved("patch", 1e-3, 1.78e8, 8.9e7),
+            # A coarser mesh, and energies without a spring, have smaller errors.
+            self.solved("patch", 0.0, 1.6e8, 8e7, mesh_size=5e-3),
+            self.solved("neo-hooke", 1e-5, 0.0, 0.0),
+        ])  # fmt: skip
+        answer = (
+            "For 100x20, free 1 mm, steel: patch 1.78e8 N/m inside (0.89 E t), 8.9e7 N/m on the outline, "
+            "error +0.10 %; best uniform stiffness 1.7e8 N/m (paper), error −20 %."
+        )
+        assert said.startswith(answer)
+        assert "patch, linear 0.05 %; +0.10 %" in said and "paper, linear 20 %; −20 %" in said
+        assert "Medians of each mesh size; a line joins them. Run time: deriving" in said
+        assert "Predicted" not in said and "The paper's tables" not in said  # no curve, nothing printed
+
+    def test_where_nothing_is_solved_it_says_so(self, tmp_path):
+        failed = {"status": Status.FAILED, "message": "refuses the mesh", "stiffness_inside": 1.7e8}
+        assert self.said(tmp_path, [failed]).startswith("No error of scenes is known: none is solved with a reference")
 
 
 class TestCommand:

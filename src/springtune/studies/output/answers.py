@@ -65,26 +65,31 @@ def _own_law_errors(finite: Variables, places: Mapping[str, np.ndarray]) -> np.n
 
 
 class DefinitionErrors(NamedTuple):
-    """Sizes of the errors of a definition, and the place of the largest among the cells."""
+    """Valid errors of a definition: places among the cells, and sizes."""
 
     labels: tuple[str, ...]  # definition, and kinematics where a study has them
+    places: np.ndarray
     errors: np.ndarray
-    worst: int
 
     @property
     def median(self) -> float:
         """Median size."""
         return float(np.median(self.errors))
 
+    @property
+    def worst(self) -> int:
+        """Place of the largest among the cells."""
+        return int(self.places[np.argmax(self.errors)])
+
 
 def definition_errors(cells: Columns) -> list[DefinitionErrors]:
     """Valid errors of each definition and kinematics, in the order of the cells."""
-    sizes, found = np.abs(cells["valid_error"]), []
     by = [cells[name] for name in ("definition", "kinematics") if name in cells]
+    known, found = np.isfinite(cells["valid_error"]), []
     for labels in dict.fromkeys(zip(*(column.tolist() for column in by))):
-        own = np.isfinite(sizes) & np.all([column == label for column, label in zip(by, labels)], axis=0)
-        if own.any():
-            found.append(DefinitionErrors(labels, sizes[own], int(np.argmax(np.where(own, sizes, -1.0)))))
+        places = np.flatnonzero(known & np.all([column == label for column, label in zip(by, labels)], axis=0))
+        if places.size:
+            found.append(DefinitionErrors(labels, places, np.abs(cells["valid_error"][places])))
     return found
 
 
@@ -94,6 +99,7 @@ class Answer(NamedTuple):
     labels: tuple[str, ...]  # of the mesh type and material
     mesh_size: float
     definition: str
+    uniform: bool
     inside: np.ndarray
     outline: np.ndarray
     ratio: float  # median inside over E t
@@ -113,19 +119,20 @@ def what_to_type(cells: Columns, by: Sequence[str] = ("mesh_type", "material")) 
     known, uniform = np.isfinite(cells["valid_error"]), np.isfinite(cells.get("stiffness", missing))
     inside, outline = cells["stiffness_inside"], cells["stiffness_outline"]
     ratio = inside / cells.get("material_young_modulus", missing) / cells.get("beam_thickness", missing)
-    known &= np.isfinite(inside) | np.isfinite(outline)
+    known &= (np.abs(inside) > 0) | (np.abs(outline) > 0)  # energies alone have no stiffness to type
     for labels in dict.fromkeys(zip(*(cells[name].tolist() for name in by))):
         here = np.all([cells[name] == label for name, label in zip(by, labels)], axis=0)
         if not (here & known).any():
             continue
         size = float(cells["mesh_size"][here & known].min())
         here &= cells["mesh_size"] == size
-        answers: dict[bool, list[Answer]] = {False: [], True: []}
+        answers = []
         for name in sorted({*cells["definition"][here & known].tolist()}):
             own = here & (cells["definition"] == name)
             springs, edges = (np.unique(values[own & np.isfinite(values)]) for values in (inside, outline))
             share = ratio[own & np.isfinite(ratio)]
             median = float(np.median(share)) if share.size else np.nan
             errors = cells["valid_error"][own & known]
-            answers[bool(uniform[own].any())].append(Answer(labels, size, name, springs, edges, median, errors))
-        yield tuple(min(group, key=lambda one: one.median_error) for group in answers.values() if group)
+            answers.append(Answer(labels, size, name, bool(uniform[own].any()), springs, edges, median, errors))
+        kinds = ([one for one in answers if one.uniform == alike] for alike in (False, True))
+        yield tuple(min(kind, key=lambda one: one.median_error) for kind in kinds if kind)

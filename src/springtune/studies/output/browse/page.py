@@ -28,8 +28,10 @@ from springtune.safe_io.atomic import write_json, write_text
 
 from ...config.kind import modules
 from .. import reading
+from ..answers import broadcast
 from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
 from . import View
+from .overview import GROUPS, overview
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
@@ -47,6 +49,8 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
     with reading.opened(dataset) as file, reading.guarded(dataset):
         groups = packed(file)
+        parts = {group.name: _read(group, file) for group in (file, *file.groups.values()) if group.name in GROUPS}
+        found = overview(parts, files)
     attributes = groups[0]["attributes"]
     declared = {path: asdict(view) for path, view in views().items()}
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
@@ -65,6 +69,7 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
         policy=f"{policy}; form-action 'none'",
         style=Markup(_asset("style.css")),
         script=Markup(script),
+        overview=found,
         blocks={name: _compress(text.encode()) for name, text in texts.items()},
     )
 
@@ -160,6 +165,13 @@ def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
     return {name: str(stored.attrs[name]) for name in ("units", "long_name") if name in stored.attrs}
 
 
+def _read(group: h5netcdf.Group, root: h5netcdf.File) -> dict[str, tuple[Sequence[str], np.ndarray]]:
+    """Dimensions and values of a group's variables, and of the labels that it shares with the root."""
+    dims = {name for stored in group.variables.values() for name in stored.dimensions}
+    labels = {name: root.variables[name] for name in dims if name in root.variables}
+    return {name: (stored.dimensions, _values(stored)) for name, stored in (labels | dict(group.variables)).items()}
+
+
 def _values(stored: h5netcdf.Variable) -> np.ndarray:
     """Values of an array; missing integers are NaN."""
     values, fill = stored[...], stored.attrs.get("_FillValue")
@@ -167,9 +179,7 @@ def _values(stored: h5netcdf.Variable) -> np.ndarray:
 
 
 def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
-    """Values of an array with an axis for each of `dims`, of length 1 where it has none."""
-    values = stored[...].transpose([stored.dimensions.index(name) for name in dims if name in stored.dimensions])
-    return values[tuple(slice(None) if name in stored.dimensions else None for name in dims)]
+    return broadcast(dims, stored.dimensions, stored[...])
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------

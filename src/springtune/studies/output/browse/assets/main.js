@@ -75,7 +75,8 @@ class Page {
     const root = await this.groups["/"].load(), others = Object.values(this.groups).filter((group) => group !== root);
     this.counted = others.filter((group) => group.status && group.path !== "/sensitivity");
     for (const group of this.counted) await group.load();
-    this.views = {};
+    const overview = document.getElementById("overview");
+    this.views = overview ? { overview: { title: "Overview", holder: overview } } : {};
     const declared = (group, name) => ({ note: "", plots: [], columns: [], ...(this.declared[group.path] || { title: spoken(name) }) });
     if (asked(root.tally())) this.views.cells = new Cells(this, declared(root, "cells"));
     else if (Object.keys(root.fields).length && !root.fields.status) this.views.cells = new Explorer(this, root, declared(root, "cells"));
@@ -112,7 +113,7 @@ class Page {
       if (place >= 0) places[name] = place;
     }
     if (asked(root.tally())) this.places = { ...(this.places || this.firstPlaces(root)), ...places };
-    await this.open(names.includes(wanted.get("view")) ? wanted.get("view") : names[0]);
+    await this.open(names.includes(wanted.get("view")) ? wanted.get("view") : Object.keys(places).length ? "cells" : names[0]);
   }
 
   firstPlaces({ status }) {
