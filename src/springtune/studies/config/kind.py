@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from springtune.registry import import_name
 
@@ -23,6 +26,27 @@ KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/ki
 
 FORMATS = ("png", "pdf")
 """Endings of a figure's files."""
+
+Variables = dict[str, tuple[tuple[str, ...], str, str, Any]]
+"""Dimensions, units, long name and value of an empty cell, by name."""
+
+EMPTY_VALUES = {"": np.nan, "text": "", "0": 0, "-1": -1, "float32": np.float32(np.nan), "int8": np.int8(0)}
+EMPTY_VALUES |= {"int32": np.int32(0), "no node": np.int32(-1)}
+"""Values of empty cells by their names in tables of variables."""
+
+
+def declared_variables(module: str, group: str = "", **dimensions: tuple[str, ...]) -> Variables:
+    """Variables by the table beside a module's file, of one of its groups if it has several.
+
+    Its ``dimensions`` are names of dimensions, or of several of them that are given here.
+    """
+    found = {}
+    with Path(module).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if row.get("group", "") == group:
+                own = tuple(name for word in row["dimensions"].split() for name in dimensions.get(word, (word,)))
+                found[row["name"]] = own, row["units"], row["long_name"], EMPTY_VALUES[row["empty"]]
+    return found
 
 
 @dataclass(frozen=True)
@@ -93,7 +117,7 @@ class StudyKind:
     expand: Callable[[Any, Any], Any] = lambda config, declared: ()  # part of a study, of its config and `Declared`
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}  # labels by dimension
     summary: Callable[[Any], list[list[object]]] = lambda part: []  # rows of `springtune scenes`
-    variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)  # as `dataset.Group`
+    variables: Variables = field(default_factory=dict)
     dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
     flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
     sparse: bool = False  # whether variables that no result has are left out

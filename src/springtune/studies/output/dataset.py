@@ -241,7 +241,7 @@ def tree(file: h5netcdf.File) -> xr.DataTree:
     """Dataset of an open file: small arrays in memory, large ones read on demand."""
     groups, sizes = {}, dict[str, int]()
     for group in (file, *file.groups.values()):
-        store = H5NetCDFStore(group)  # type: ignore[no-untyped-call]
+        store: Any = H5NetCDFStore(group)
         sizes |= {name: dimension.size for name, dimension in group.dimensions.items()}
         variables = {}
         for name, stored in group.variables.items():

@@ -1,6 +1,5 @@
 """Run time against error: a study's section ``benchmark``."""
 
-from math import nan
 from typing import Annotated
 
 from pydantic import Field
@@ -15,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind
+from ...config.kind import Stage, StudyKind, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
@@ -144,31 +143,6 @@ def _code_keys(approaches):
     return springs, meshes, program() if any(name.startswith("calculix") for name in approaches) else ""
 
 
-CASE = ("scene", "approach", "mesh_size")
-
-VARIABLES = {
-    "displacement": (CASE, "m", "displacement of the loaded side along the force", nan),
-    "error": (CASE, "1", "signed error of the displacement, over the reference's", nan),
-    "assured_error": (CASE, "1", "largest absolute error of this and all finer mesh sizes that were run", nan),
-    "seconds": (CASE, "s", "time from nothing to the displacement, median of warm runs", nan),
-    "meshing_seconds": (CASE, "s", "time to make the mesh", nan),
-    "assembling_seconds": (CASE, "s", "time to derive parameters and assemble", nan),
-    "factorizing_seconds": (CASE, "s", "time to factorize, or of what is paid once", nan),
-    "solving_seconds": (CASE, "s", "time to solve", nan),
-    "unknowns": (CASE, "1", "number of unknowns", nan),
-    "status": (CASE, "1", "what became of the case", 0),
-    "message": (CASE, "1", "why there are no numbers", ""),
-    "reference_displacement": (("scene",), "m", "displacement of the converged reference", nan),
-    "reference_error_estimate": (("scene",), "1", "estimated relative error of the reference", nan),
-    "reference_seconds": (("scene",), "s", "time of the reference", nan),
-    "spring_updates": (
-        ("mesh_size", "thread_count", "precision"),
-        "s-1",
-        "nonlinear springs a second that explicit steps advance, each step counted anew",
-        nan,
-    ),
-}
-
 KIND = StudyKind(
     "benchmark",
     study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error: group `/benchmark`.")},
@@ -176,7 +150,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=_axes,
     summary=lambda part: [["benchmark", len(part), "cases, timed one by one"]],
-    variables=VARIABLES,
+    variables=declared_variables(__file__),
     dimensions={
         "scene": "scene of the benchmark",
         "approach": "definition / mesh type, or another approach",

@@ -72,9 +72,9 @@ def _mesh_row(mesh):
 def _network_row(arrays):
     """Values of a network, and of its reference at the particles, from its stored arrays."""
     row = {}
-    for name, stored in (("displacement", "displacements"), ("particle_reference", "reference_displacements")):
-        if stored in arrays:
-            row[f"{name}_x"], row[f"{name}_y"] = arrays[stored].T
+    for name, array in (("displacement", "displacements"), ("particle_reference", "reference_displacements")):
+        if array in arrays:
+            row[f"{name}_x"], row[f"{name}_y"] = arrays[array].T
     if "displacements" in arrays:
         row |= {"spring_force": arrays["spring_forces"], "stiffness": arrays["spring_stiffnesses"]}
     return row

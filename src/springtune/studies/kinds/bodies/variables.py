@@ -1,15 +1,14 @@
 """Variables of the groups of beams and shapes, as ``variables.csv`` declares them."""
 
-import csv
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from springtune.problem.parameters import OF_BODIES, SWEPT
 
-from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SPRING_ATTRIBUTES, UGRID, Group
+from ...config.kind import declared_variables
+from ...output.dataset import PARTICLE_ATTRIBUTES, SPRING_ATTRIBUTES, UGRID, Group
 from ...output.selection import SHOWN_PREFIX
 from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES
 
@@ -26,20 +25,10 @@ DIMENSIONS = {"MESH": MESH, "REFERENCE": REFERENCE, "CELL": CELL, "CURVE": CURVE
 DIMENSIONS |= {"SHAPE_MESH": MESH_AXES, "SHAPE_CASE": CASE_AXES, "SHAPE_SCENE": SCENE_AXES}
 """Dimensions that the file gives one name."""
 
-EMPTY_VALUES: dict[str, float | str | np.number[Any]] = {"": np.nan, "text": "", "0": 0, "-1": -1}
-EMPTY_VALUES |= {"float32": np.float32(np.nan), "int32": np.int32(0), "no node": NO_NODE}
-"""Values of empty cells by their names in the file."""
-
 
 def declared(group: str, **options: Any) -> Group:
     """Group of the dataset with its variables from the file."""
-    with Path(__file__).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["group"] == group]
-    variables = {}
-    for row in rows:
-        dimensions = tuple(name for word in row["dimensions"].split() for name in DIMENSIONS.get(word, (word,)))
-        variables[row["name"]] = dimensions, row["units"], row["long_name"], EMPTY_VALUES[row["empty"]]
-    return Group(group, variables, **options)
+    return Group(group, declared_variables(__file__, group, **DIMENSIONS), **options)
 
 
 YES_OR_NO = {"applies": ("no", "yes")}

@@ -1,10 +1,10 @@
 """Scenes in engines, gathered in the groups ``/engines`` and ``/engine_curves``."""
 
 from collections import defaultdict
-from math import nan
 
 import numpy as np
 
+from ...config.kind import declared_variables
 from ...output.dataset import Group
 from ...runs.plan import results
 from . import RUN_ENDS, SETTING
@@ -13,41 +13,9 @@ from .kind import STAGE
 NETWORK, FACTOR = ("scene", "definition"), "stiffness_factor"
 RUN = (*NETWORK, "engine", *SETTING)
 
-RUN_COORDINATES = {
-    "scene_beam": (("scene",), "1", "beam", ""),
-    "scene_mesh_type": (("scene",), "1", "mesh type", ""),
-    "scene_mesh_size": (("scene",), "m", "asked length of an edge", nan),
-    "scene_material": (("scene",), "1", "material", ""),
-    "scene_load": (("scene",), "1", "load", ""),
-    "scene_force": (("scene",), "N", "magnitude of the force", nan),
-    "program": (("engine",), "1", "program that the engine is of", ""),
-}
-"""Descriptions of scenes and engines."""
-
-
-def _variables(cell):
-    """Variables of runs, networks and engines."""
-    return {
-        "displacement": (cell, "m", "displacement at rest", nan),
-        "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
-                              nan),
-        "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", nan),
-        "solver_error": (cell, "1", "what the engine's solver adds to the errors of definition and law", nan),
-        "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", nan),
-        "frame_seconds": (cell, "s", "time of a frame, without the first ones", nan),
-        "frames": (cell, "1", "frames that were taken", nan),
-        "swing": (cell, "m", "largest amplitude about the mean", nan),
-        "status": (cell, "1", "what became of the run", 0),
-        "engine_status": (cell, "1", "how the run ended", 0),
-        "message": (cell, "1", "why it is not at rest, or not comparable", ""),
-        "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", nan),
-        "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", nan),
-        "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", nan),
-        "particles": (NETWORK, "1", "number of particles", nan),
-        "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
-        **RUN_COORDINATES,
-    }  # fmt: skip
-
+SCENE_PARTS = ("beam", "mesh_type", "mesh_size", "material", "load", "force")
+RUN_COORDINATES = (*(f"scene_{part}" for part in SCENE_PARTS), "program")
+"""Variables that describe scenes and engines."""
 
 ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "scene": "scene in engines",
@@ -60,15 +28,12 @@ ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
 }
 """Dimensions of these groups."""
 
-BEST_VARIABLES = {
-    "best_factor": (RUN, "1", "factor at which the displacement is the reference's", nan),
-    "best_factor_message": (RUN, "1", "why no factor is the best", ""),
-}
-
 FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
 
-ENGINE_RUNS = Group("/engines", _variables(RUN), ENGINE_DIMENSIONS, FLAGS)
-ENGINE_CURVES = Group("/engine_curves", _variables((*RUN, FACTOR)) | BEST_VARIABLES, ENGINE_DIMENSIONS, FLAGS)
+ENGINE_RUNS = Group("/engines", declared_variables(__file__, "runs", RUN=RUN), ENGINE_DIMENSIONS, FLAGS)
+CURVE_VARIABLES = declared_variables(__file__, "runs", RUN=(*RUN, FACTOR))
+CURVE_VARIABLES |= declared_variables(__file__, "best", RUN=RUN)
+ENGINE_CURVES = Group("/engine_curves", CURVE_VARIABLES, ENGINE_DIMENSIONS, FLAGS)
 
 
 def groups(study, folder):

@@ -2,7 +2,6 @@
 
 from dataclasses import asdict
 from itertools import product
-from math import nan
 from typing import Annotated
 
 from pydantic import Field
@@ -13,7 +12,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind
+from ...config.kind import Stage, StudyKind, declared_variables
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from .outputs import OUTPUTS
@@ -27,8 +26,6 @@ REFERENCE_SIZES = (1.0, 1.25, 1.6)
 LOADING, NETWORK = ("loading", "friction"), ("definition", "mesh_size")
 STRIP = (*NETWORK, *LOADING)
 """Dimensions of a loading, of a network, and of a network under a loading."""
-
-BAND_MEANING = "twice its spread over three meshes of finite elements"
 
 MOST_STRIPS = 10_000
 """Most strips of a study; each takes seconds."""
@@ -128,37 +125,6 @@ def _tasks(study):
         yield Task(values, also, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
 
 
-def _outline_variables(name, dimensions, whose):
-    """Variables of the points of an outline."""
-    return {f"{name}_{axis}": (dimensions, "m", f"{whose} along {axis}", nan) for axis in "xy"}
-
-
-LAYING_VARIABLES = {
-    "area_under_strip": (STRIP, "m2", "area between the strip and the floor, network", nan),
-    "area_error": (STRIP, "1", "area under the strip over the trapezoid's, less 1", nan),
-    "elongation": (STRIP, "1", "elongation of the strip's lower fibre, network", nan),
-    "penetration": (STRIP, "1", "largest penetration over the mesh size", nan),
-    "contact_force_error": (STRIP, "1", "vertical contact force less the load, over the load", nan),
-    "load_share": (STRIP, "1", "share of the load that was reached", nan),
-    "iterations": (STRIP, "1", "Newton steps", nan),
-    "laying_seconds": (STRIP, "s", "time to lay the strip", nan),
-    "status": (STRIP, "1", "what became of the scene", 0),
-    "message": (STRIP, "1", "why the strip is not laid", ""),
-    "skipped": (STRIP, "1", "what the scene did not need", ""),
-    **_outline_variables("strip", (*STRIP, "outline_point"), "outline of the laid strip"),
-    "reference_area": (LOADING, "m2", "area between the strip and the floor, finite elements", nan),
-    "reference_area_error_estimate": (
-        LOADING, "m2", f"band of the area between strip and floor, {BAND_MEANING}", nan,
-    ),
-    "reference_elongation": (LOADING, "1", "elongation of the lower fibre, finite elements", nan),
-    "reference_elongation_error_estimate": (
-        LOADING, "1", f"band of the elongation of the lower fibre, {BAND_MEANING}", nan,
-    ),
-    **_outline_variables("reference", (*LOADING, "outline_point"), "outline of the strip of finite elements"),
-    **_outline_variables("trapezoid", ("corner",), "corners of the trapezoid"),
-}  # fmt: skip
-
-
 KIND = StudyKind(
     "laying",
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid: group `/laying`.")},
@@ -166,7 +132,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in NETWORK},
     summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
-    variables=LAYING_VARIABLES,
+    variables=declared_variables(__file__),
     dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
     stages=(Stage("laying", "studies.kinds.laying.solve", _tasks),),
     outputs=OUTPUTS,

@@ -1,7 +1,6 @@
 """Effective moduli of definitions: a flag of a grid, and the box on whose meshes they are measured."""
 
 from itertools import product
-from math import nan
 
 from pydantic import Field
 
@@ -11,7 +10,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.kind import Stage, StudyKind
+from ...config.kind import Stage, StudyKind, declared_variables
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
@@ -114,16 +113,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=_axes,
     summary=_summary,
-    variables={
-        "young_modulus_error": (PATCH, "1", "error of Young's modulus along x, effective / asked - 1", nan),
-        "effective_poisson_ratio": (PATCH, "1", "effective Poisson's ratio under load along x", nan),
-        "shear_modulus_error": (PATCH, "1", "error of the shear modulus, effective / asked - 1", nan),
-        "definition_seconds": (PATCH, "s", "time to derive the springs' parameters", nan),
-        "definition_evaluations": (PATCH, "1", "solves that deriving the springs' parameters took", nan),
-        "spring_ratio": (PATCH, "1", "largest spring stiffness over the smallest", nan),
-        "status": (PATCH, "1", "what became of the patch test", 0),
-        "message": (PATCH, "1", "why there are no moduli", ""),
-    },
+    variables=declared_variables(__file__),
     dimensions={"poisson_ratio": "Poisson's ratio that the definition is asked for"},
     attributes=_attributes,
     stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import chain, product
-from math import nan
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +13,7 @@ from springtune.problem.status import Status
 from springtune.reference.answers import unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
+from ...config.kind import declared_variables
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
@@ -23,27 +23,9 @@ from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_ke
 from .outputs import QUANTITIES
 from .solve import DRAWN
 
-REFERENCE = ("sample", "load")
-NETWORK = ("sample", "load", "definition")
-
-REFERENCE_BOUND = "bound on the relative error of the reference, that of its interpolation included"
-APPLIES = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
-
 SAMPLES = Group(
     "/samples",
-    {
-        "displacement": (NETWORK, "m", "displacement of the loaded side, network", nan),
-        "deformation_error": (NETWORK, "1", "(network - reference) / |reference|, signed", nan),
-        "stiffness": (NETWORK, "N/m", "stiffness of all springs, where they have one", nan),
-        "status": (NETWORK, "1", "what became of the scene", 0),
-        "message": (NETWORK, "1", "why the scene is not solved", ""),
-        "reference_displacement": (REFERENCE, "m", "displacement of the loaded side, finite elements", nan),
-        "reference_error_estimate": (REFERENCE, "1", REFERENCE_BOUND, nan),
-        "reference_applies": (REFERENCE, "1", APPLIES, np.int8(0)),
-        "reference_message": (("load",), "1", "why there is no reference", ""),
-        "best_stiffness": (REFERENCE, "N/m", "uniform stiffness without a deformation error", nan),
-        "particles": (("sample",), "1", "number of particles", 0),
-    },
+    declared_variables(__file__, "/samples"),
     dimensions={"sample": "row of the design"},
     further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
 )
@@ -51,24 +33,12 @@ SAMPLES = Group(
 INDEX = ("quantity", "parameter", "load", "definition")
 BASE = ("quantity", "load", "definition")
 
-ORDERS = {
-    "first": "first-order Sobol index: share of the variance by the parameter alone",
-    "total": "total-order Sobol index: share that the parameter takes part in",
-}
-
-ENDS = ("", "_low", "_high")
+ORDERS, ENDS = ("first", "total"), ("", "_low", "_high")
+"""Orders of Sobol indices, and the ends of their bootstrap bands."""
 
 SOBOL = Group(
     "/sobol",
-    {
-        f"{order}_order{end}": (INDEX, "1", meaning, nan)
-        for order, about in ORDERS.items()
-        for end, meaning in zip(ENDS, (about, "lower end of its bootstrap band", "upper end of its bootstrap band"))
-    }
-    | {
-        "base_samples": (BASE, "1", "base samples that the indices are of", 0),
-        "base_samples_without": (BASE, "1", "base samples with a scene that has no value", 0),
-    },
+    declared_variables(__file__, "/sobol"),
     dimensions={"quantity": "what is looked at", "parameter": "parameter that varies"},
 )
 

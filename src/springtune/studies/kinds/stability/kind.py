@@ -1,6 +1,5 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from math import nan
 from typing import Annotated
 
 from pydantic import Field
@@ -11,7 +10,7 @@ from springtune.mesh.types import MESH_TYPES
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_density, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind
+from ...config.kind import Stage, StudyKind, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import AXES, DEFINITION_FREE, EXPERIMENTS
@@ -95,85 +94,6 @@ def _tasks(study):
         yield Task(values, also, {"experiment": name, "definition": definition}, seconds=3.0)
 
 
-SCHEME = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
-SLIVER = ("definition", "sliver_angle")
-CONTRAST = ("stiffness_contrast",)
-POISSON = ("definition", "stressed_poisson_ratio")
-STRAIN = ("definition", "strain_load", "strain")
-PERTURBATION = ("definition", "perturbation")
-ARCH = ("definition", "arch_point")
-COLUMN = ("definition", "rows")
-DEFINITION = ("definition",)
-
-
-def _status_variables(name, dimensions, long_name):
-    """Status and message of an experiment."""
-    return {
-        f"{name}_status": (dimensions, "1", f"what became of {long_name}", 0),
-        f"{name}_message": (dimensions, "1", f"why it is not solved: {long_name}", ""),
-    }
-
-
-EXPERIMENT_VARIABLES = {
-    "dt_limit_predicted": (SCHEME, "s", "largest stable step, predicted", nan),
-    "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", nan),
-    "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", nan),
-    "omega_max": (("definition", "mesh_size"), "rad/s", "highest frequency at rest", nan),
-    "behaviour": (("integrator", "step_ratio", "map_damping_ratio"), "1", "what a run makes of noise", -1),
-    "step_ratio_predicted": (
-        ("integrator", "map_damping_ratio"),
-        "1",
-        "largest stable step over 2 / omega_max, predicted; 1000 where there is none",
-        nan,
-    ),
-    "energy_drift": (("integrator",), "1", "mean energy of the last tenth of a run over that of the first", nan),
-    "energy_swing": (("integrator",), "1", "largest less smallest energy of a run over the first", nan),
-    "energy": (("integrator", "sample"), "1", "energy over that at the start, undamped", nan),
-    "momentum_drift": (("integrator",), "1", "change of momentum over the sum of its parts", nan),
-    "steps_to_rest": (("critical_ratio",), "1", "steps to rest within 0.1 %, central difference", nan),
-    "loaded_frequency": ((), "rad/s", "lowest frequency that the load excites", nan),
-    "truncated_error": (
-        ("mesh_size", "cg_iterations", "implicit_steps"),
-        "1",
-        "distance of backward Euler from the static solution over its largest displacement",
-        nan,
-    ),
-    "relaxation_error": (("mesh_size",), "1", "distance of dynamic relaxation from the static solution", nan),
-    "relaxation_steps": (("mesh_size",), "1", "steps of dynamic relaxation", nan),
-    **_status_variables("sliver", SLIVER, "a mesh with a sliver"),
-    "sliver_negative_pivots": (SLIVER, "1", "negative pivots of the tangent with a sliver", nan),
-    "sliver_step_limit": (SLIVER, "s", "largest stable step with a sliver", nan),
-    "sliver_error": (SLIVER, "1", "displacement with a sliver over that without, less 1", nan),
-    **_status_variables("contrast", CONTRAST, "a network with stiff and soft parts"),
-    "contrast_negative_pivots": (CONTRAST, "1", "negative pivots of the tangent with a contrast", nan),
-    "contrast_error": (CONTRAST, "1", "error of the linear solution, against extended precision", nan),
-    "contrast_estimate": (CONTRAST, "1", "its estimate, by which it is judged", nan),
-    **_status_variables("poisson", POISSON, "a material near the incompressible one"),
-    "poisson_negative_pivots": (POISSON, "1", "negative pivots of the tangent", nan),
-    "poisson_modulus_error": (POISSON, "1", "error of Young's modulus along x", nan),
-    "poisson_step_limit": (POISSON, "s", "largest stable step", nan),
-    "scaled_step_limit": (("scale",), "s/m", "largest stable step over the mesh size", nan),
-    "precision_error": (("scale", "precision"), "1", "error of a run to rest, against the static solution", nan),
-    **_status_variables("strain", STRAIN, "a large strain"),
-    "negative_pivots": (STRAIN, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", nan),
-    "strain_displacement": (STRAIN, "m", "mean displacement of the loaded side along the force", nan),
-    "strain_load_share": (STRAIN, "1", "largest share of the load with a good equilibrium", nan),
-    **_status_variables("perturbed", PERTURBATION, "a mesh with particles moved"),
-    "perturbed_negative_pivots": (PERTURBATION, "1", "negative pivots of the tangent", nan),
-    "perturbed_error": (PERTURBATION, "1", "displacement with particles moved over that without, less 1", nan),
-    "perturbed_step_limit": (PERTURBATION, "s", "largest stable step with particles moved", nan),
-    "inverted_starts_right": (DEFINITION, "1", "share of inverted starts that end in the right solution", nan),
-    "inverted_starts_wrong": (DEFINITION, "1", "share of inverted starts that end as solved elsewhere", nan),
-    "buckling_load": (COLUMN, "N", "buckling load of a column twenty times as long as high", nan),
-    "buckling_message": (COLUMN, "1", "what restricts the buckling load, or why there is none", ""),
-    "euler_load": (DEFINITION, "N", "its load by Euler", nan),
-    "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", nan),
-    "arch_deflection": (ARCH, "m", "its deflection", nan),
-    "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", nan),
-    "experiment_seconds": (("experiment", "definition"), "s", "time of an experiment", nan),
-    "experiment_message": (("experiment", "definition"), "1", "why an experiment has no results", ""),
-}
-
 EXPERIMENT_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "integrator": "time integrator",
     "damper": "damping in proportion to mass, or of dampers along springs",
@@ -205,7 +125,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=_axes,
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
-    variables=EXPERIMENT_VARIABLES,
+    variables=declared_variables(__file__),
     dimensions=EXPERIMENT_DIMENSIONS,
     flags={"behaviour": BEHAVIOURS},
     sparse=True,
