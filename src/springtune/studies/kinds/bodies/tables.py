@@ -94,7 +94,7 @@ STATUS_MARKS = {"solved": "", "unstable": "u", "linear_only": "l"}
 
 
 def _page_cells(rows, definitions, swept, finite):
-    """Cells of the page, a line for each mesh, load and kinematics, two columns a definition; marks and remarks."""
+    """Cells of the page, a line for each mesh, load and kinematics, two columns a definition, the best first."""
     data = pd.DataFrame(rows)
     length = decimals(data[["network_mm", "reference_mm"]].to_numpy().ravel())
     percent, printed = error_decimals(data["error_percent"]), data["printed_displacement_mm"].notna().any()
@@ -122,9 +122,12 @@ def _page_cells(rows, definitions, swept, finite):
         said = {f"* {beam}, {size} mm": row["remark"], text: "" if answered else row["message"]}
         said[f"r {beam}, {row['kinematics']}"] = row["reference_message"] if "r" in own else ""
         remarks |= {f"{what}: {why}": None for what, why in said.items() if why}
-    empty = {(name, unit): text for name in definitions for unit, text in (("[mm]", "not asked"), ("error [%]", ""))}
-    shown = pd.DataFrame(list(lines.values())).fillna(empty)
-    shown = shown[[*(column for column in shown.columns if column not in empty), *empty]]
+    medians = data["error_percent"].abs().groupby(data["definition"]).median()
+    best = sorted(definitions, key=lambda name: (np.isnan(medians[name]), medians[name]))
+    columns = [(name, unit) for name in best for unit in ("[mm]", "error [%]")]
+    shown = pd.DataFrame(list(lines.values()))
+    marks |= {"e"} if shown.isna().to_numpy().any() else set()
+    shown = shown[[*(column for column in shown.columns if column not in columns), *columns]].fillna("")
     shown.columns = pd.MultiIndex.from_tuples(shown.columns)
     return {"shown": shown, "marks": marks, "remarks": list(remarks)}
 
