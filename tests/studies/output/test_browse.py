@@ -121,7 +121,7 @@ class TestOverview:
         reference = body | {"load": "traction", "kinematics": "linear"}
         reference |= {"reference_displacement": 1e-3, "reference_applies": 1}
         tree = xr.DataTree(ROOT.of_rows(self.AXES, [reference, *(known | row for row in rows)]))
-        tree.attrs = {"springtune_version": springtune.__version__, "study": "mine", "title": TITLE}
+        tree.attrs = {"springtune_version": st.__version__, "study": "mine", "title": TITLE}
         tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
         text = page(tmp_path / "dataset.nc")
         found = re.search(r'<section id="overview".*?</section>\n<noscript>', text, re.DOTALL)[0]
