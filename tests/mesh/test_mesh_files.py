@@ -89,6 +89,7 @@ OTHER_FILES = "parts of it are in other files, whose changes would not be seen"
 LINEAR = "write linear triangles and quadrilaterals only"
 MSH = "write 4.1 or 2.2: Mesh.MshFileVersion = 4.1"
 ROWS = yaml.safe_load(Path(__file__).with_name("mesh_files.yaml").read_text())
+MSH41, MSH22 = ROWS["texts"].values()
 
 
 def filled(text):
@@ -111,88 +112,9 @@ ABAQUS["lower case, with comments, blanks, CR and a mark at the beginning"] = "\
 )
 
 
-def section(name, *rows):
-    """A section of Gmsh's files, its rows given as numbers."""
-    return "".join(f"{line}\n" for line in (f"${name}", *(" ".join(map(str, row)) for row in rows), f"$End{name}"))
-
-
-def named(groups, names):
-    return section("PhysicalNames", [len(groups)], *((d, tag, f'"{name}"') for d, tag, name in groups)) if names else ""
-
-
-def msh41(names=True, sign=-1, two=False, parametric=0, loose=False):
-    """Version 4.1: curves 1 and 2 are the right side, surfaces 1 and 2 the parts; tags of points are spaced."""
-    curves, surfaces = {1: [101], 2: [sign * 101], 3: [sign * 102]}, {1: [sign * 201], 2: [202]}
-    if two:
-        curves = {tag: [*groups, -103] for tag, groups in curves.items()}
-        surfaces = {tag: [203, *groups] for tag, groups in surfaces.items()}
-    curves |= {4: []} if loose else {}
-    groups = [
-        (1, 101, "right"),
-        (1, 102, "left"),
-        (2, 201, "hard"),
-        (2, 202, "soft"),
-        (1, 103, "ends"),
-        (2, 203, "all"),
-    ]
-    entities = [
-        (tag, *[0.5] * 6, len(own), *own, 2, 1, -2) for found in (curves, surfaces) for tag, own in found.items()
-    ]
-    points = [
-        [(tag, x, y) for tag, (x, y) in zip(range(10, 151, 10), POINTS)][part] for part in (slice(10), slice(10, 15))
-    ]
-    nodes = [row for which, own in enumerate(points) for row in (
-        (2, which + 1, parametric * (1 - which), len(own)), *([tag] for tag, *_ in own),
-        *((x, y, 0, *[0.1, 0.2] * parametric * (1 - which)) for _, x, y in own))]  # fmt: skip
-    blocks = [(1, 1, 1, RIGHT[:1]), (1, 2, 1, RIGHT[1:, ::sign]), (1, 3, 1, LEFT), (2, 1, 3, QUADS[:2]),
-              (2, 1, 2, TRIANGLES[:4]), (2, 2, 3, QUADS[2:]), (2, 2, 2, TRIANGLES[4:])]  # fmt: skip
-    blocks += [(1, 4, 1, np.array([[1, 2]]))] * loose
-    count = sum(len(cells) for *_, cells in blocks)
-    cells = [row for *head, own in blocks for row in ([*head, len(own)], *([1, *corners] for corners in 10 * own))]
-    return (
-        section("MeshFormat", [4.1, 0, 8])
-        + named(groups, names)
-        + section("Entities", [0, len(curves), len(surfaces), 0], *entities)
-        + section("Nodes", [2, 15, 10, 150], *nodes)
-        + section("Elements", [len(blocks), count, 1, count], *cells)
-    )
-
-
-def msh22(names=True, partition=0, twice=False):
-    """Version 2.2, where an element that is in two groups stands twice."""
-    groups = [
-        (1, 101, "right"),
-        (1, 102, "left"),
-        (2, 201, "hard"),
-        (2, 202, "soft"),
-        (2, 203, "all"),
-        (1, 203, "ends"),
-    ]
-    cells = [(1, 101, RIGHT), (1, 102, LEFT), (2, 201, TRIANGLES[:4]), (3, 201, QUADS[:2]), (2, 202, TRIANGLES[4:]),
-             (3, 202, QUADS[2:]), (1, 203, RIGHT), (1, 203, LEFT)]  # fmt: skip
-    cells += [(3, 203, QUADS), (2, 203, TRIANGLES)] * twice
-    listed = [(1, kind, 4, tag, 1, 1, partition or tag, *row) for kind, tag, found in cells for row in found]
-    return (
-        section("MeshFormat", [2.2, 0, 8])
-        + named(groups, names)
-        + section("Nodes", [15], *((n, x, y, 0) for n, (x, y) in enumerate(POINTS, 1)))
-        + section("Elements", [len(listed)], *listed)
-    )
-
-
 NUMBERED = ("102", "101", "201", "202")
 
-GMSH = {
-    "4.1": msh41(sign=1),
-    "4.1, reversed": msh41(),
-    "4.1, all reversed": msh41().replace(" 1 101 2 1 -2", " 1 -101 2 1 -2"),
-    "4.1, two groups": msh41(two=True),
-    "4.1, two groups, no names": msh41(two=True, names=False),
-    "4.1, points with parameters": msh41(parametric=1),
-    "4.1, elements of no group": msh41(loose=True),
-    "2.2, two groups": msh22(),
-    "2.2, two groups, no names": msh22(names=False),
-}
+GMSH = {name: changed(*row) for name, row in ROWS["gmsh"].items()}
 
 
 def write_clean(path):
@@ -274,9 +196,6 @@ def replaced(write, old, new):
         path.write_bytes(path.read_bytes().replace(old, new))
 
     return written
-
-
-MSH41, MSH22, PARTITIONED, TWICE22 = msh41(), msh22(), msh22(partition=2), msh22(twice=True)
 
 
 REFUSED = {file: (changed(*row), filled(says)) for file, *row, says in ROWS["refused"]} | {
