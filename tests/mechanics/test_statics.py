@@ -234,12 +234,7 @@ FLAWS = {
     "unstable beyond the load": ({"unstable_share": 1.2}, st.Status.SOLVED, "", 0),
     "limit at the load": ({"limit_share": 1.0}, st.Status.SOLVED, "", 0),
     "unstable at the load": ({"unstable_share": 1.0}, st.Status.SOLVED, "", 0),
-    "limit": (
-        {"limit_share": 0.123},
-        st.Status.UNSTABLE,
-        "turns back and becomes unstable at 12.3 %",
-        np.nan,
-    ),
+    "limit": ({"limit_share": 0.123}, st.Status.UNSTABLE, "turns back and becomes unstable at 12.3 %", np.nan),
     "no equilibrium": (
         {"converged": False, "reason": "no luck"},
         st.Status.NOT_CONVERGED,

@@ -5,19 +5,12 @@ import shutil
 import subprocess
 import sys
 
-SMALL = """\
-title: small
-beams: {short: {length: 60 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  grid: {beam: short, mesh_type: right, mesh_size: 10 mm, material: steel, load: traction, force: 1 kN,
-         definition: lattice}
-"""
+from tables import STUDIES
 
 
 def test_deployment_methods_change_nothing(run):
     """Jobs stay on the packages that keys of results have: no environment is made, and nothing runs again."""
-    run.write("small.yaml", SMALL)
+    run.write("small.yaml", STUDIES["smallest"])
     mesh = "results/small/done/mesh_0.json"
     asked = ("--software-deployment-method", "conda", "--dry-run", mesh)
     code, told = run.snakemake("small.yaml", "--nocolor", mesh)

@@ -8,21 +8,7 @@ import pytest
 
 from tables import STUDIES
 
-OTHERS = """\
-rule all:
-    input: "told.txt", "results/mine/index.html"
-
-module springtune:
-    snakefile: {snakefile}
-    config: {config}
-{further}
-use rule * from springtune as springtune_*
-
-rule tell:
-    input: "results/mine/dataset.nc"
-    output: "told.txt"
-    shell: "echo told > {{output}}"
-"""
+OTHERS = Path(__file__).with_name("others.smk").read_text()
 
 REPOSITORY = Path(__file__).parents[2]
 

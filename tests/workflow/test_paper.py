@@ -2,24 +2,15 @@
 
 import re
 
-STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
-STUDY = """
-title: As small as it gets
-beams:
-  80x10: {{length: 80 mm, height: {height} mm}}
-materials:
-  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
-outputs: [tables]
-grids:
-  one: {{beam: 80x10, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
-        definition: lattice, kinematics: linear, sensitivity: false}}
-"""
+from tables import STUDIES
+
+NAMES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 
 
 def write(run):
     """The studies of the paper, each of one scene, of which each has another beam."""
-    for height, name in enumerate(STUDIES, 10):
-        run.write(f"{name}.yaml", STUDY.format(height=height))
+    for height, name in enumerate(NAMES, 10):
+        run.write(f"{name}.yaml", STUDIES["smallest"].replace("height: 10", f"height: {height}"))
 
 
 def jobs(output):
@@ -31,7 +22,7 @@ def test_the_paper_takes_all_its_studies_and_another_target_takes_one(run):
     write(run)
     code, output = run.snakemake("paper.yaml", "-n", "paper")
     assert code == 0, output
-    assert {"paper", "collect", *(f"{name}_collect" for name in STUDIES[1:])} <= jobs(output)
+    assert {"paper", "collect", *(f"{name}_collect" for name in NAMES[1:])} <= jobs(output)
     code, output = run.snakemake("definitions.yaml", "-n")
     assert code == 0, output
     assert {"collect", "mesh", "solve"} <= jobs(output) and not {"paper", "block_collect"} & jobs(output)

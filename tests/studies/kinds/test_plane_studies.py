@@ -8,28 +8,9 @@ from springtune.studies.output.selection import select_own_law
 from springtune.studies.runs import provenance
 
 import campaigns
+from tables import STUDIES
 
-STUDY = """
-title: A slice of a wall beside a sheet
-beams:
-  wall: {length: 40 mm, height: 20 mm}
-materials:
-  rock: {young_modulus: 30 GPa, poisson_ratio: 0.25, plane: strain}
-  sheet: {young_modulus: 30 GPa, poisson_ratio: 0.3, plane: stress}
-  clay: {young_modulus: 30 MPa, poisson_ratio: 0.45, plane: strain}
-further_references: [neo-hooke-plane-stress, neo-hooke-plane-strain]
-grids:
-  pull:
-    beam: wall
-    mesh_type: structured
-    mesh_size: 10 mm
-    material: MATERIALS
-    load: pressure
-    force: 1 N
-    definition: [lattice, delingette, neo-hooke]
-    kinematics: [linear, nonlinear]
-    moduli: true
-"""
+STUDY = STUDIES["planes"]
 
 
 @pytest.fixture

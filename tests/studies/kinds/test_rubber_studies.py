@@ -95,15 +95,9 @@ def test_networks_are_compared_with_the_law_of_their_material(here):
 def test_the_table_of_definitions_marks_what_is_beyond_small_strain(here):
     """Errors against small strain of rubber at large strain are no definition's alone; near rest they are."""
     head = STUDY.partition("further_references")[0]
-    grid = """\
-outputs: definitions
-grids:
-  pull: {beam: block, mesh_type: free, mesh_size: 2.5 mm, material: [tested, plain], load: [traction, compression],
-         force: FORCE, definition: [neo-hooke, delingette], sensitivity: false, moduli: true}
-"""
     beyond = {}
     for name, force in (("far", "3 N"), ("near", "0.03 N")):
-        study(head + grid.replace("FORCE", force), f"{name}.yaml")
+        study(head + STUDIES["rubber_force"].replace("FORCE", force), f"{name}.yaml")
         (table,) = tables(Campaign(f"{name}.yaml").collected())
         beyond[name] = {(row["material"], row["load"]) for row in table["rows"] if row["beyond_small_strain"]}
     assert not beyond["near"] and ("tested", "traction") in beyond["far"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 
 import springtune as st
 from springtune.reference.interpolant import TOLERANCE
@@ -13,6 +14,7 @@ from springtune.studies.runs import store
 from springtune.studies.runs.plan import plan
 
 from campaigns import do_stages
+from tables import STUDIES
 
 MANY, FEW = 32, 20
 
@@ -22,21 +24,12 @@ def few_alone(monkeypatch):
     monkeypatch.setattr(bodies_plan, "MOST_SOLVED_ALONE", 25)
 
 
-def text(lengths, outputs="[size]", definition="lattice", more=""):
+def text(lengths, outputs=("size",), definition="lattice"):
     """A study of beams of one height."""
-    beams = "\n".join(f"  b{number}: {{length: {length:.6g} mm, height: 10 mm}}" for number, length in lengths.items())
-    names = ", ".join(f"b{number}" for number in lengths)
-    return f"""\
-title: Beams of many lengths
-beams:
-{beams}
-materials:
-  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  all: {{beam: [{names}], mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
-        definition: {definition}, kinematics: linear, sensitivity: false}}
-{more}outputs: {outputs}
-"""
+    study = yaml.safe_load(STUDIES["many_lengths"]) | {"outputs": [*outputs]}
+    study["beams"] = {f"b{one}": {"length": f"{mm:.6g} mm", "height": "10 mm"} for one, mm in lengths.items()}
+    study["grids"]["all"] |= {"beam": [*study["beams"]], "definition": definition}
+    return yaml.safe_dump(study, sort_keys=False)
 
 
 def lengths(count):
@@ -79,11 +72,10 @@ def test_values_added_inside_the_box_leave_the_interpolant_as_it_is(load):
     assert wider != box
 
 
-@pytest.mark.parametrize(
-    "options",
-    [{"outputs": "[size, deformed]"}, {"outputs": "[size, deformed, tables]"}, {"definition": "[lattice, annealed]"}],
-    ids=str,
-)
+WHOLE = ({"outputs": ["size", "deformed"]}, {"outputs": ["size", "deformed", "tables"]})
+
+
+@pytest.mark.parametrize("options", (*WHOLE, {"definition": ["lattice", "annealed"]}), ids=str)
 def test_where_whole_fields_are_asked_for_references_are_solved_by_themselves(load, options):
     assert interpolants(load(lengths(MANY), **options)) == {}
 
