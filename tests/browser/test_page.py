@@ -4,12 +4,17 @@ import os
 from pathlib import Path
 from urllib.request import url2pathname
 
+import numpy as np
 import pytest
 from selenium.webdriver import Keys
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
+from conftest import written
 from springtune.problem.compare import sign_sentence
+from springtune.studies.kinds.bodies.variables import ROOT
+
+from synthetic import LABELS, dataset
 
 CURVE = "springtune.views.cells.plots.curve.chart.sources.points.data.y.join()"
 SIZE = "springtune.views.cells.plots.size.chart.sources.points.data"
@@ -106,7 +111,7 @@ class TestSelection:
 
     def test_every_status_is_told_with_its_message(self, browser, small):
         browser.open(small)
-        assert "5 cells" not in browser.ask("return document.querySelector('#end').textContent")
+        assert "5 scenes" not in browser.ask("return document.querySelector('#end').textContent")
         for word in ("solved", "linear only", "not converged", "unstable", "failed", "not requested"):
             assert word in browser.ask("return document.querySelector('#end').textContent")
         place = browser.ask("const t = springtune.views.cells, row = t.status.values.indexOf(5);"
@@ -226,7 +231,7 @@ class TestWhatIsSo:
 
     def test_the_head_counts_all_that_a_study_has(self, browser, odd):
         browser.open(odd)
-        assert text(browser, "#end").startswith("288 cells:")
+        assert text(browser, "#end").startswith("288 scenes:")
         said = text(browser, "#holds")
         assert "Samples: ● solved 96" in said and "Shapes: ● solved" in said
 
@@ -257,8 +262,9 @@ class TestWhatIsSo:
         browser.open(odd)
         assert "%, too stiff" in choose(browser, load=0, kinematics=1)
         assert "%, too soft" in choose(browser, load=1, kinematics=1)
-        for place in (".list", "#panel-size", "#panel-map"):
-            assert sign_sentence({"traction": 1, "compression": -1}) in text(browser, place)
+        assert sign_sentence({"traction": 1, "compression": -1}) in text(browser, ".list")
+        for place in ("#panel-size", "#panel-map"):  # of the load that they show
+            assert "negative: too soft" in text(browser, place) and "traction" not in text(browser, place)
         show(browser, "shapes")
         assert "other quantities: positive: too large" in text(browser, ".view-shapes")  # of an energy
 
@@ -275,6 +281,28 @@ class TestWhatIsSo:
         assert "× 0.0" in text(browser, "#panel-network")
         browser.driver.find_element(By.CSS_SELECTOR, "#panel-network [data-dim=definition]").send_keys("area")
         assert "tension positive" in text(browser, "#panel-network")
+
+
+def test_what_has_linear_networks_alone_is_drawn_and_named_so(browser, tmp_path):
+    root = dataset("fields").to_dataset()
+    root.status.attrs = ROOT.empty(LABELS).status.attrs
+    root["deformation_error"].loc[{"definition": "area", "kinematics": "nonlinear"}] = np.nan
+    root["status"].loc[{"definition": "area", "kinematics": "nonlinear"}] = 0
+    browser.open(written(tmp_path, {"/": root}))
+    choose(browser, kinematics=root.kinematics.values.tolist().index("nonlinear"))
+    named = text(browser, "#panel-size")
+    assert "area, linear" in named and "paper, nonlinear" in named
+    tiles = browser.ask("return springtune.views.cells.plots.map.chart.cells.map((one) => one.name)")
+    assert {one.rpartition(", ")[0] for one in tiles} == {"area, linear", "paper, nonlinear"}
+
+
+def test_at_1440_pixels_no_column_is_cut(browser, odd):
+    browser.resize(1440)
+    browser.open(odd)
+    assert browser.ask("const g = arguments[0]; return g.scrollWidth <= g.clientWidth", grid(browser))
+    browser.driver.find_element(By.ID, "columns").click()
+    assert browser.ask("const g = arguments[0]; return g.scrollWidth > g.clientWidth", grid(browser))
+    assert "residual" in text(browser, ".list thead")
 
 
 class TestFilters:

@@ -177,18 +177,20 @@ OUTPUTS = (
 VIEWS = (
     View(
         "/",
-        "Cells",
-        "All variables of the cells, over any of their parameters.",
+        "Scenes",
+        "All variables of the scenes, over any of their parameters.",
         (
             Plot("errors of definitions on mesh types", "deformation_error", "mesh_type", "definition", "map"),
             Plot("errors of definitions under loads", "deformation_error", "load", "definition", "map"),
             Plot("error over mesh size", "deformation_error", "mesh_size", "definition", log="xy"),
             Plot("error of the whole field over mesh size", "field_error", "mesh_size", "definition", log="xy"),
+            Plot("error over seconds", "deformation_error", "solve_seconds", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
             Plot("seconds over particles", "solve_seconds", "particles", "definition", along="mesh_size", log="xy"),
-            Plot("what became of the cells", "status", "mesh_size", "definition", "map"),
+            Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
         ),
         ("deformation_error", "status", "displacement", "reference_displacement", "field_error", "stiffness",
-         "paper_deformation_error", "paper_displacement", "particles", "solve_seconds", "residual", "message",
+         "stiffness_inside", "stiffness_outline", "paper_deformation_error", "paper_displacement", "particles", "solve_seconds", "residual", "message",
          "reference_message", "paper_remark"),
     ),
     View(
@@ -228,7 +230,7 @@ VIEWS = (
     View(
         "/fields",
         "Fields",
-        "Positions and displacements of all particles of the coarsest meshes; the view of cells draws the networks.",
+        "Positions and displacements of all particles of the coarsest meshes; the view of scenes draws the networks.",
         (
             *particle_plots("outline of the reference"),
             Plot("displacements of the outline", "reference_displacement_x", "outline_x", along="outline_point"),

@@ -90,7 +90,7 @@ class Chart(NamedTuple):
     title: str = ""
 
 
-def overview(groups: Mapping[str, Variables], files: Iterable[str]) -> Content:
+def overview(groups: Mapping[str, Variables]) -> Content:
     """Content of the overview of a dataset's groups."""
     found, root, curves = [], groups.get("/", {}), groups.get("/sensitivity", {})
     for source in SOURCES:
@@ -102,7 +102,6 @@ def overview(groups: Mapping[str, Variables], files: Iterable[str]) -> Content:
         "sources": found,
         "curves": _curves({**root, **curves}) if "deformation_error" in curves else {},
         "paper": _paper_tables(requested_cells(root)) if "paper_table" in root else {},
-        "files": {*files},
     }
 
 

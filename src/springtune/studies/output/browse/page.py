@@ -50,11 +50,11 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     with reading.opened(dataset) as file, reading.guarded(dataset):
         groups = packed(file)
         parts = {group.name: _read(group, file) for group in (file, *file.groups.values()) if group.name in GROUPS}
-        found = overview(parts, files)
+        found = overview(parts)
     attributes = groups[0]["attributes"]
     declared = {path: asdict(view) for path, view in views().items()}
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
-    content = {"groups": groups, "declared": declared, "files": sorted(files), "scale": scale}
+    content = {"groups": groups, "declared": declared, "scale": scale}
     library = _library()
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in PAGE_SCRIPTS) + "})();\n"
@@ -69,6 +69,8 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
         policy=f"{policy}; form-action 'none'",
         style=Markup(_asset("style.css")),
         script=Markup(script),
+        attributes=attributes,
+        files=sorted(files),
         overview=found,
         blocks={name: _compress(text.encode()) for name, text in texts.items()},
     )

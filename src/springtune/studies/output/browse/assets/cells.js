@@ -5,7 +5,7 @@ const SCENE_ERROR = "deformation_error";
 class Cells {
   constructor(page, { columns }) {
     const root = page.groups["/"], { fields: all, status } = root;
-    Object.assign(this, { page, root, status, fields: all, dims: status.dims, title: "Cells" });
+    Object.assign(this, { page, root, status, fields: all, dims: status.dims, title: "Scenes" });
     const names = columns.length ? columns : ["status", ...Object.keys(all).filter((name) => name !== "status")];
     this.names = names.filter((name) => all[name]?.within(this.dims) && !all[name].isEmpty);
     this.varying = this.dims.filter((name) => this.root.dims[name].size > 1);
@@ -16,11 +16,14 @@ class Cells {
     this.networks = await this.page.groups["/fields"]?.load();
     const counter = element("span", { class: "soft", role: "status", "aria-live": "polite" });
     const reset = element("button", { type: "button", class: "copy", id: "reset", text: "Reset filters", onclick: () => this.table.reset() });
+    const all = element("button", { type: "button", class: "copy", id: "columns", text: "All columns", onclick: () => {
+      all.textContent = this.table.holder.classList.toggle("few") ? "All columns" : "Few columns";
+    } });
     const word = (row) => this.status.meaning(this.status.values[row]), rows = upTo(this.status.size).filter((row) => word(row) !== "not_requested");
     this.table = new Table({
-      columns: this.columns(), rows, label: "Cells of the study", kind: word, choose: (row) => this.page.choose(this.status.placesOf(row)),
+      columns: this.columns(), rows, label: "Scenes of the study", kind: word, choose: (row) => this.page.choose(this.status.placesOf(row)),
       changed: (count, wrong) => {
-        counter.textContent = [`${count} of ${rows.length} cells shown.`, ...wrong].join(" ");
+        counter.textContent = [`${count} of ${rows.length} scenes shown.`, ...wrong].join(" ");
         reset.disabled = !Object.values(this.table?.filters || {}).some(Boolean);
       },
     });
@@ -28,7 +31,7 @@ class Cells {
     const sign = this.fields[SCENE_ERROR]?.isEmpty === false && this.fields[SCENE_ERROR].sign;
     this.side = element("div", { class: "chosen-cell" });
     holder.append(element("div", { class: "cells" }, element("div", { class: "list" },
-      element("div", { class: "row soft small" }, reset, counter, constant && `All cells: ${constant}.`), this.table.holder,
+      element("div", { class: "row soft small" }, reset, all, counter, constant && `All scenes: ${constant}.`), this.table.holder,
       element("p", { class: "soft small" }, "Click a row, or use the arrow keys in the table. Click a head to sort.",
         sign ? ` Deformation error, (network − reference) / |reference|: ${sign}.` : "")),
     this.side));
@@ -47,9 +50,9 @@ class Cells {
     const words = root.tally().map((one) => spoken(one[0]));
     const more = this.names.map((name) => {
       const field = all[name], scale = unitOf(field)[0], of = (row) => field.of(status.placesOf(row));
-      if (name === "status") return { name, title: "status", labels: words, value: of, text: (row) => spoken(state(row)),
+      if (name === "status") return { name, title: "status", narrow: true, labels: words, value: of, text: (row) => spoken(state(row)),
         node: (row) => badge(state(row)), width: Math.max(...words.map((one) => one.length)) + 6 };
-      return { name, title: titled(field), hint: field.long_name, numeric: !field.isText && !field.flags, pinned: name === SCENE_ERROR,
+      return { name, title: titled(field), hint: field.long_name, numeric: !field.isText && !field.flags, pinned: name === SCENE_ERROR, more: name !== SCENE_ERROR,
         width: field.isText ? 34 : Math.max(13, widest(titled(field))), text: (row) => written(field, of(row)),
         value: (row) => (field.isText ? of(row) : of(row) * scale), size: field.error ? (row) => Math.abs(of(row)) : undefined };
     });
@@ -61,7 +64,7 @@ class Cells {
     this.heading = element("h2", { "aria-live": "polite" });
     this.selectors = element("div", { class: "row" });
     this.facts = element("div");
-    this.code = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "Python code of this cell" });
+    this.code = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "Python code of this scene" });
     const plot = (value, x, more = {}) => ({ value, x, by: "", shows: "lines", log: "", beside: [], along: "", ...more });
     const by = "definition" in root.dims ? "definition" : "";
     this.plots = { map: new Plot(root, this.page.declared["/"]?.plots || [], { choose }) };
@@ -69,13 +72,13 @@ class Cells {
       { bare: true, choose, limit: 60, marks: () => this.stiffnesses() });
     if (error && this.varying.includes("mesh_size"))
       this.plots.size = new Plot(root, [plot(SCENE_ERROR, "mesh_size", { by, log: "x" })], { bare: true, choose });
-    const titles = { curve: "Sensitivity: error against uniform stiffness, to 60 %", size: "Error against mesh size", map: "Cells compared" };
+    const titles = { curve: "Sensitivity: error against uniform stiffness, to 60 %", size: "Error against mesh size", map: "Scenes compared" };
     this.network = Network.drawnFrom(this.networks) ? new Network(this.networks) : null;
     const none = this.networks?.left_out.length ? LEFT_OUT : "This dataset has no displacement fields: the study does not ask for the output 'deformed'.";
     this.side.append(this.heading, this.selectors, this.facts,
       ...Object.keys(titles).filter((name) => this.plots[name]).map((name) => panel(name, titles[name], this.plots[name].holder)),
       panel("shape", "The network over its reference", this.network ? this.network.holder : element("p", { class: "none", text: none })),
-      panel("code", "This cell in Python", this.code));
+      panel("code", "This scene in Python", this.code));
   }
 
   // Show a cell; called for every change of the selection.
@@ -96,7 +99,7 @@ class Cells {
 
   drawPlot(plot) {
     const places = plot.group.placesFrom(this.root, this.places), left = plot.group.left_out.length;
-    if (!places || !plot.plot) return plot.chart.say(left ? LEFT_OUT : "This dataset has nothing of this cell.");
+    if (!places || !plot.plot) return plot.chart.say(left ? LEFT_OUT : "This dataset has nothing of this scene.");
     plot.chosen = places;
     return plot.render();
   }
@@ -132,7 +135,7 @@ class Cells {
   stiffnesses() {
     const { best_stiffness: best, predicted_stiffness: predicted } = this.curves.fields, at = this.plots.curve.chosen;
     const found = { printed: this.value("paper_stiffness"), best: best?.of(at), predicted: predicted?.of(at) };
-    return Object.entries(found).filter((one) => one[1] > 0).map(([name, x]) => ({ name: `${name}: ${number(x)} N/m`, x }));
+    return Object.entries(found).filter((one) => one[1] > 0).map(([name, x]) => ({ name: `${name}: ${number(x)} N/m${name === "predicted" ? ", by a formula" : ""}`, x }));
   }
 
   // Of what a study sweeps, and of meshes, fields are kept of one: offer the cell with fields that differs in fewest labels.
@@ -148,7 +151,7 @@ class Cells {
     const size = at && !network.has(at) ? sizes.find((i) => Number.isFinite(moved.of({ ...at, mesh_size: i }))) : undefined;
     if (size !== undefined) kept.mesh_size = root.place("mesh_size", group.label("mesh_size", size));
     const others = this.dims.filter((name) => kept[name] >= 0 && kept[name] !== places[name]);
-    if (!others.length) return at && network.has(at) ? network.show(at) : network.say("There are no displacement fields of this cell.");
+    if (!others.length) return at && network.has(at) ? network.show(at) : network.say("There are no displacement fields of this scene.");
     const labels = others.map((name) => labelWithUnit(root.dims[name], kept[name])).join(", ");
     return network.say(`Displacement fields are kept of ${others.map(spoken).join(", ")} ${labels}.`,
       element("button", { type: "button", text: `Show ${labels}`, onclick: () => this.page.choose(kept) }));
@@ -158,8 +161,8 @@ class Cells {
     const { root, places, curves } = this, { study } = root.attributes;
     const labels = (group) => this.dims.filter((name) => name in group.dims).map((name) => `    ${literal(name)}: ${literal(root.label(name, places[name]))},`);
     const lines = ["import xarray as xr", "", `tree = xr.open_datatree(${literal(`results/${study}/dataset.nc`)}, engine="h5netcdf")`,
-      "cell = tree.to_dataset().sel({", ...labels(root), "})"];
-    if (this.fields[SCENE_ERROR]) lines.push(`print(float(cell.${SCENE_ERROR}))`);
+      "scene = tree.to_dataset().sel({", ...labels(root), "})"];
+    if (this.fields[SCENE_ERROR]) lines.push(`print(float(scene.${SCENE_ERROR}))`);
     if (curves?.placesFrom(root, places)) lines.push("", "curve = tree[\"sensitivity\"].to_dataset().sel({", ...labels(curves), "})");
     return `${lines.join("\n")}\n`;
   }

@@ -96,7 +96,7 @@ class Chart {
       Object.assign(axis, {
         axis_label_text_color: text, axis_label_text_font: FONT, axis_label_text_font_style: "normal", axis_label_text_font_size: "13px",
         major_label_text_color: soft, major_label_text_font: FONT, major_label_text_font_size: "12px", axis_line_color: line,
-        major_tick_line_color: line, minor_tick_line_color: null, major_tick_in: 0, major_label_policy: new B.NoOverlap({ min_distance: 4 }),
+        major_tick_line_color: line, minor_tick_line_color: null, major_tick_in: 0, major_tick_out: 0, major_label_policy: new B.NoOverlap({ min_distance: 4 }),
       });
       if (!ticks) continue;
       axis.ticker = new B.FixedTicker({ ticks: ticks.map((one) => one[0]) });

@@ -46,25 +46,6 @@ class Explorer {
   }
 }
 
-// The study as it was asked for, and where its results come from.
-class About {
-  constructor(page) {
-    Object.assign(this, { page, title: "Study" });
-  }
-
-  build(holder) {
-    const { config, software, title, ...about } = this.page.groups["/"].attributes;
-    const code = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "The study's YAML", text: config || "" });
-    const links = ["dataset.nc", ...this.page.files].map((path) => element("li", {}, element("a", { href: path, text: path })));
-    holder.append(element("h2", { text: title || "Study" }),
-      panel("source", "Where it comes from", plainTable(Object.entries(about).map(([name, value]) => [spoken(name), String(value)])),
-        element("p", { class: "small", text: software })),
-      panel("config", "The study, as run", code),
-      panel("files", "Files", element("ul", { class: "links columns" }, links),
-        element("p", { class: "soft small", text: "Links work where this page lies in the folder of its study." })));
-  }
-}
-
 class Page {
   constructor(content) {
     Object.assign(this, content);
@@ -75,13 +56,13 @@ class Page {
     const root = await this.groups["/"].load(), others = Object.values(this.groups).filter((group) => group !== root);
     this.counted = others.filter((group) => group.status && group.path !== "/sensitivity");
     for (const group of this.counted) await group.load();
-    const overview = document.getElementById("overview");
+    const [overview, study] = ["overview", "study"].map((name) => document.getElementById(name));
     this.views = overview ? { overview: { title: "Overview", holder: overview } } : {};
     const declared = (group, name) => ({ note: "", plots: [], columns: [], ...(this.declared[group.path] || { title: spoken(name) }) });
     if (asked(root.tally())) this.views.cells = new Cells(this, declared(root, "cells"));
     else if (Object.keys(root.fields).length && !root.fields.status) this.views.cells = new Explorer(this, root, declared(root, "cells"));
     for (const group of others) this.views[group.path.slice(1)] = new Explorer(this, group, declared(group, group.path.slice(1)));
-    this.views.study = new About(this);
+    this.views.study = { title: "Study", holder: study };
     this.head(root);
     document.getElementById("tabs").append(...Object.entries(this.views).map(([name, view]) => element("a", { href: `#view=${name}`, text: view.title })));
     addEventListener("hashchange", () => this.follow());
@@ -90,18 +71,14 @@ class Page {
   }
 
   head(root) {
-    const about = root.attributes, put = (id, ...children) => document.getElementById(id).append(...children.flat());
+    const put = (id, ...children) => document.getElementById(id).append(...children.flat());
     const count = ([word, number_]) => element("span", { class: "count" }, badge(word, number_)), all = asked(root.tally());
-    put("facts", [about.study, `springtune ${about.springtune_version}`, about.git_commit && `commit ${about.git_commit.slice(0, 10)}`,
-      about.created?.slice(0, 10)].filter(Boolean).join(" · "));
-    if (all) put("end", element("b", { text: all === 1 ? "1 cell:" : `${all} cells:` }), root.tally().map(count),
+    if (all) put("end", element("b", { text: all === 1 ? "1 scene:" : `${all} scenes:` }), root.tally().map(count),
       root.notRequested ? element("span", { class: "soft", text: `${root.notRequested} not requested` }) : "");
     for (const group of this.counted.filter((one) => asked(one.tally()))) {
       const name = group.path.slice(1);
       put("holds", element("span", { class: "holds" }, element("a", { href: `#view=${name}`, text: this.views[name].title }), ": ", group.tally().map(count)));
     }
-    const links = { "dataset.nc": "dataset.nc", "tables/index.html": "tables", "paper.pdf": "paper.pdf", "report.zip": "report" };
-    for (const [path, text] of Object.entries(links)) if (path === "dataset.nc" || this.files.includes(path)) put("links", element("a", { href: path, text }));
   }
 
   // What the address says: a view, and for each dimension of the root a label.

@@ -112,17 +112,17 @@ class Plot {
     const size = (values, logarithmic) => (logarithmic ? values.map(Math.abs) : values);
     const status = this.statusOf(field), dim = dims[plot.by], count = dims[along].size, series = [];
     for (const i of plot.by ? upTo(dim.size) : [-1]) {
-      const places = i < 0 ? this.chosen : { ...this.chosen, [plot.by]: i };
-      const x = size(this.axis(plot.x, along, places), logx), y = size(this.axis(plot.value, along, places), logy);
+      const { places, name } = this.placesOf(i, field, along), x = size(this.axis(plot.x, along, places), logx);
+      const y = size(this.axis(plot.value, along, places), logy);
       const words = status?.dims.includes(along) ? status.along(along, places).map((one) => status.meaning(one)) : y.map(() => "solved");
       let kept = upTo(count).filter((j) => Number.isFinite(x[j]) && Number.isFinite(y[j]));
       if (!kept.length) continue;
       if (plot.ascending) kept.sort((a, b) => x[a] - x[b]);
       else if (kept.some((j) => Math.abs(y[j]) <= limit)) kept = kept.filter((j) => Math.abs(y[j]) <= limit);
       else kept = upTo(count); // with gaps where there is nothing
-      const mine = this.choose && plot.x in this.chosen && (i < 0 || this.chosen[plot.by] === i);
+      const mine = this.choose && plot.x in this.chosen && (i < 0 || this.chosen[plot.by] === i) && places.kinematics === this.chosen.kinematics;
       series.push({
-        name: i < 0 ? "" : labelWithUnit(dim, i), look: look(Math.max(i, 0)), x: kept.map((j) => x[j]), y: kept.map((j) => y[j]),
+        name, look: look(Math.max(i, 0)), x: kept.map((j) => x[j]), y: kept.map((j) => y[j]),
         words: kept.map((j) => words[j]), hollow: kept.map((j) => words[j] !== "solved"),
         chosen: mine ? kept.indexOf(this.chosen[along]) : -1, width: mine ? 3 : 1.8,
         line: plot.shows !== "points", markers: plot.shows === "points" || !(plot.equal || count > 200),
@@ -145,7 +145,7 @@ class Plot {
     const ticks = textual ? labels.map((text, i) => [i, text]) : labels && count <= 8 ? this.axis(plot.x).map((one) => [one, number(one)]) : undefined;
     const marks = this.marks();
     this.under.replaceChildren(legend(shown, [...marks.map((one) => one.name), hollowWords(series),
-      logy && field.signed ? "sizes of errors; the table has their signs" : field.sign,
+      logy && field.signed ? "sizes of errors; the table has their signs" : this.signOf(field),
       series.length > MOST_LINES && `and ${series.length - MOST_LINES} lines more: the table below has them all`,
       field.flags && Object.entries(field.flags).map(([key, word]) => `${key}: ${spoken(word)}`).join(", ")]));
     return drawLines(this.chart, {
@@ -156,6 +156,23 @@ class Plot {
     });
   }
 
+  // Places of a line or a row, in other kinematics where it has nothing in the chosen ones; with its name.
+  placesOf(i, field, along) {
+    const { group, plot } = this, places = i < 0 ? this.chosen : { ...this.chosen, [plot.by]: i }, kinds = group.dims.kinematics;
+    const name = i < 0 ? "" : labelWithUnit(group.dims[plot.by], i);
+    if (i < 0 || !field.dims.includes("kinematics") || [along, plot.by].includes("kinematics") || kinds.size < 2) return { places, name };
+    const there = (one) => field.along(along, one).some((value) => (field.flags ? field.meaning(value) !== "not_requested" : !absent(value)));
+    const found = [places, ...upTo(kinds.size).map((kinematics) => ({ ...places, kinematics }))].find(there) || places;
+    return { places: found, name: `${name}, ${kinds.labels[found.kinematics || 0]}` };
+  }
+
+  // The sentence on the signs of errors, of the load that is seen.
+  signOf(field) {
+    const root = window.springtune.groups["/"], seen = this.choose && ![this.plot.x, this.plot.by].includes("load");
+    const size = seen ? root.fields.reference_displacement?.of(root.placesFrom(this.group, this.chosen) || {}) : 0;
+    return field.sign && size ? `${size > 0 ? "positive" : "negative"}: too soft` : field.sign;
+  }
+
   // Statuses of the values of a variable, where the group has them.
   statusOf(field) {
     const { status } = this.group;
@@ -164,7 +181,7 @@ class Plot {
 
   map(field) {
     const { plot, group, chosen } = this, across = group.dims[plot.x], down = group.dims[plot.by], unit = unitOf(field)[1], status = this.statusOf(field);
-    const read = (i, j) => field.of({ ...chosen, [plot.x]: i, [plot.by]: j });
+    const own = upTo(down.size).map((j) => this.placesOf(j, field, plot.x)), read = (i, j) => field.of({ ...own[j].places, [plot.x]: i });
     const there = (value) => (field.flags ? !["", "not_requested"].includes(field.meaning(value)) : Number.isFinite(value));
     const word = (places) => (status ? status.meaning(status.of(places)) : "solved");
     const columns = upTo(across.size).filter((i) => upTo(down.size).some((j) => there(read(i, j))));
@@ -172,7 +189,7 @@ class Plot {
     if (!columns.length) return this.chart.say(`Nothing here: ${spoken(plot.value)} has no value for this choice.`);
     const scale = scaleOf(field, columns.flatMap((i) => rows.map((j) => read(i, j))).filter(Number.isFinite)), words = new Set();
     const cells = rows.flatMap((j, row) => columns.map((i, column) => {
-      const places = { ...chosen, [plot.x]: i, [plot.by]: j }, value = read(i, j), of = word(places), name = `${labelText(down, j)}, ${labelText(across, i)}`;
+      const places = { ...own[j].places, [plot.x]: i }, value = read(i, j), of = word(places), name = `${own[j].name}, ${labelText(across, i)}`;
       const more = { row, column, places, name };
       if (field.flags) return { ...more, colour: statusColour(field, value), text: SIGNS[field.meaning(value)] || "", tip: spoken(field.meaning(value)) };
       if (of !== "solved" && of !== "not_requested") words.add(`${SIGNS[of]} ${spoken(of)}`);
@@ -181,10 +198,10 @@ class Plot {
       return { ...more, rgb: scale.of(value), text: written(field, value, 2) + sign, tip: `${written(field, value)} ${unit}, ${spoken(of)}` };
     }));
     const missing = [[across, columns], [down, rows]].flatMap(([dim, kept]) => upTo(dim.size).filter((i) => !kept.includes(i)).map((i) => labelText(dim, i)));
-    this.under.replaceChildren(scale.key([...words, field.sign, this.choose && "click a tile to choose it",
+    this.under.replaceChildren(scale.key([...words, this.signOf(field), this.choose && "click a tile to choose it",
       missing.length && `with nothing here, left out: ${missing.slice(0, 6).join(", ")}${missing.length > 6 ? ` and ${missing.length - 6} more` : ""}`]));
     return drawTiles(this.chart, {
-      cells, columns: columns.map((i) => labelText(across, i)), rows: rows.map((j) => labelText(down, j)),
+      cells, columns: columns.map((i) => labelText(across, i)), rows: rows.map((j) => own[j].name),
       x: titled({ ...across, name: plot.x }), y: titled({ ...down, name: plot.by }), pick: this.choose && ((cell) => this.choose(cell.places)),
       chosen: this.choose && { row: rows.indexOf(chosen[plot.by]), column: columns.indexOf(chosen[plot.x]) },
     });
@@ -193,10 +210,11 @@ class Plot {
   // What the plot shows as numbers, or texts.
   table(field, along) {
     const { plot, group } = this, dim = group.dims[along], by = group.dims[plot.by], unit = unitOf(field)[1];
-    const of = (i) => field.along(along, i < 0 ? this.chosen : { ...this.chosen, [plot.by]: i });
-    const kept = (by ? upTo(by.size) : [-1]).map((i) => [i, of(i)]).filter(([, values]) => !values.every(absent));
+    const line = (i) => [i, this.placesOf(i, field, along)];
+    const kept = (by ? upTo(by.size) : [-1]).map(line).map(([i, { places, name }]) => [i, field.along(along, places), name])
+      .filter(([, values]) => !values.every(absent));
     const columns = [{ name: along, title: titled({ ...dim, name: along }), value: (row) => row, text: (row) => labelText(dim, row) }];
-    for (const [i, values] of kept) columns.push({ name: `${i}`, title: i < 0 ? titled(field) : labelWithUnit(by, i), numeric: !field.isText && !field.flags,
+    for (const [i, values, name] of kept) columns.push({ name: `${i}`, title: name || titled(field), numeric: !field.isText && !field.flags,
       value: (row) => (field.isText ? values[row] : values[row] * unitOf(field)[0]), text: (row) => written(field, values[row], 5) });
     const rows = upTo(dim.size).filter((row) => kept.some(([, values]) => !absent(values[row])));
     for (const one of columns) one.width = Math.max(12, one.title.length / 2 + 3, ...rows.slice(0, 50).map((row) => one.text(row).length + 3));
@@ -206,7 +224,7 @@ class Plot {
       this.open = details.open;
       fill();
     } }, element("summary", { text: `${spoken(field.name)}${unit ? ` [${unit}]` : ""} in numbers` }),
-      element("p", { class: "small", text: [field.long_name, field.sign].filter(Boolean).join("; ") }));
+      element("p", { class: "small", text: [field.long_name, this.signOf(field)].filter(Boolean).join("; ") }));
     this.numbers.replaceChildren(details);
     fill();
   }

@@ -11,9 +11,9 @@ class Table {
     this.body = element("tbody");
     const width = columns.reduce((sum, one) => sum + one.width, 0);
     this.table = element("table", { style: `width:${width}ch` },
-      element("colgroup", {}, columns.map((one) => element("col", { style: `width:${one.width}ch` }))), this.head(), this.body);
+      element("colgroup", {}, columns.map((one) => element("col", { class: classes(one), style: `--width:${one.width}ch` }))), this.head(), this.body);
     this.holder = element("div", {
-      class: "grid", tabindex: "0", role: "grid", "aria-label": label, "aria-colcount": columns.length,
+      class: columns.some((one) => one.more) ? "grid few" : "grid", tabindex: "0", role: "grid", "aria-label": label, "aria-colcount": columns.length,
       style: `max-height: calc(${rows.length * ROW}px + 8rem)`, onscroll: () => this.draw(), onkeydown: (event) => this.key(event),
       onclick: (event) => {
         const row = event.target.closest("tr[data-place]");
@@ -37,7 +37,7 @@ class Table {
         column.labels.map((text) => element("option", { value: text, text })));
       return element("input", { type: "text", placeholder: column.numeric ? "e.g. −2..2, >5" : "contains", spellcheck: "false", ...properties });
     });
-    const cells = this.inputs.map((input, i) => element("td", { class: this.columns[i].pinned ? "pinned" : "" }, input));
+    const cells = this.inputs.map((input, i) => element("td", { class: classes({ ...this.columns[i], numeric: false }) }, input));
     return element("thead", {}, element("tr", {}, this.headings), element("tr", { class: "filters" }, cells));
   }
 
@@ -145,5 +145,5 @@ class Table {
 }
 
 function classes(column) {
-  return [column.numeric && "number", column.pinned && "pinned"].filter(Boolean).join(" ");
+  return [column.numeric && "number", column.pinned && "pinned", column.more && "more", column.narrow && "narrow"].filter(Boolean).join(" ");
 }

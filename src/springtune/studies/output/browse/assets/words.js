@@ -111,6 +111,6 @@ function plainTable(rows) {
 }
 
 function badge(status, count = "") {
-  return element("span", { class: `status ${status}` },
+  return element("span", { class: `status ${status}`, title: spoken(status) },
     element("span", { class: "sign", "aria-hidden": "true", text: SIGNS[status] || "?" }), ` ${spoken(status)} ${count}`.trimEnd());
 }
