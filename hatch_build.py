@@ -55,7 +55,9 @@ class Description(MetadataHookInterface):
 
 CARRIED = {
     "Snakefile": "Snakefile",
+    "README.md": "README.md",
     "config": "config",
+    "docs": "docs",
     "examples": "examples",
     "workflow": "workflow",
     "workflow/profiles": "profiles",  # where Snakemake looks for them: beside the Snakefile

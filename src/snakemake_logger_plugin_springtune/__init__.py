@@ -1,6 +1,7 @@
 """Snakemake logger plugin: a moving line of progress on a terminal, elsewhere a line for each rule."""
 
 import os
+import signal
 import sys
 import threading
 import time
@@ -22,6 +23,18 @@ LINE = "\r\x1b[?7l{}\x1b[K\x1b[?7h"
 
 NUMBERS = {LogEvent.JOB_INFO: "jobid", LogEvent.JOB_FINISHED: "job_id", LogEvent.JOB_ERROR: "jobid"}
 """Attribute of a record with the job's number, by event: the job runs, is done, or failed."""
+
+
+STOPPED = "stopped; what is computed is kept: the same command takes up where this one stopped"
+
+
+def end_quietly(number: int, frame: object) -> None:
+    """Say in one line that Ctrl-C stops the run; what Snakemake and its threads print on their way out is dropped."""
+    os.write(2, (LINE.format(STOPPED) if os.isatty(2) else STOPPED).encode() + b"\n")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
+    raise KeyboardInterrupt
 
 
 class Display:
@@ -100,6 +113,8 @@ class LogHandler(LogHandlerBase):
         quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()}
         otherwise = asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag
         self.wanted = not otherwise and not quiet & {"all", "progress", "rules"}
+        if self.wanted and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, end_quietly)
 
     def emit(self, record: LogRecord) -> None:
         """Show a record."""

@@ -216,7 +216,8 @@ class TestPredictAMesh:
         lines, written = words(text.stdout), json.loads(target.read_text())
         assert lines[1] == "engine xpbd, dt 1/60 s, 20 substeps, 10 iterations, float64"
         assert lines[2] == f"factor {written['header']['calibrated']['factor']:.5g}"
-        compliance = re.fullmatch("type compliance ([^ ]+) to ([^ ]+) m/N: 1 / k of a spring", lines[3])
+        place = "type compliance inside ([^ ]+), on the outline ([^ ]+) m/N: 1 / k of a spring"
+        compliance = re.fullmatch(place, lines[3])
         least, most = map(float, compliance.groups())
         assert 1 / max(written["stiffness"]) == pytest.approx(least, rel=1e-4)
         assert 1 / min(written["stiffness"]) == pytest.approx(most, rel=1e-4)

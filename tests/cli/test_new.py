@@ -92,7 +92,10 @@ class TestNew:
 
     def test_it_runs_as_it_is(self, checkout):
         run("new", "my-study")
+        assert run("scenes", "config/my-study.yaml").stdout.endswith("nothing is stored in results/my-study\n")
         scenes = ran("config/my-study.yaml")
+        said = run("scenes", "config/my-study.yaml").stdout.splitlines()[-1]
+        assert said.startswith("stored in results/my-study: ") and said.endswith("solve 2 of 2; a run computes nothing")
         assert float(abs(scenes.deformation_error).max()) < 0.1
 
     def test_outside_of_a_checkout_it_is_written_here(self, tmp_path, monkeypatch):
@@ -101,6 +104,22 @@ class TestNew:
         assert len(st.load_study(tmp_path / "my-study.yaml").scenes) == 2
         schema = re.search(r"\$schema=(\S+)", (tmp_path / "my-study.yaml").read_text())[1]
         assert (tmp_path / schema).resolve() == REPOSITORY / "config/study.schema.json"
+
+    @pytest.mark.parametrize("source", sorted(path.stem for path in (REPOSITORY / "config").glob("*.yaml")))
+    def test_a_study_that_comes_along_is_copied_with_its_files(self, source, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        assert run("new", "mine", "--from", source).exit_code == 0
+        copied, its_own = st.load_study("mine.yaml"), st.load_study(REPOSITORY / f"config/{source}.yaml")
+        assert copied.scenes == its_own.scenes and len(copied.files) == len(its_own.files)
+        first, text = Path("mine.yaml").read_text().split("\n", 1)
+        assert (tmp_path / first.partition("=")[2]).resolve() == REPOSITORY / "config/study.schema.json"
+        assert "README.md explains" not in text
+
+    def test_files_of_a_copied_study_replace_no_others(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        Path("paper_tables.csv").write_text("mine")
+        refused(run("new", "mine", "--from", "paper"), 1, "paper_tables.csv: is there already, and is not that of")
+        assert not Path("mine.yaml").exists()
 
     def test_nothing_is_overwritten(self, checkout):
         run("new", "my-study")
@@ -157,7 +176,7 @@ class TestRun:
         run("run", "--list-rules")
         studies = [command[-1].removeprefix("--configfile=") for _, command in called]
         assert studies == [str(REPOSITORY / "config/paper.yaml"), "config/paper.yaml"]
-        assert f"did you mean {REPOSITORY / 'config/quick.yaml'}?" in run("run", "quick").stderr
+        assert "; `springtune new quick --from quick` writes it here" in run("run", "quick").stderr
 
     @pytest.mark.parametrize("named", [["--workflow-profile", "slurm"], ["--workflow-profile=workflow/profiles/slurm"]])
     @pytest.mark.skipif(bool(find_spec(SLURM)), reason="the plugin is installed")

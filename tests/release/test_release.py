@@ -25,7 +25,7 @@ WITHIN = re.compile(
     r"|springtune/cli/study_of_a_(beam|shape)\.yaml"
     r"|springtune/handover/templates/[\w.]+\.jinja"
     r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
-    r"|springtune/workflow/(Snakefile|config/.*|examples/.*|profiles/.*|workflow/.*)"
+    r"|springtune/workflow/(Snakefile|README.md|config/.*|docs/.*|examples/.*|profiles/.*|workflow/.*)"
     r"|snakemake_logger_plugin_springtune/\w+\.py"
     rf"|{NAME}\.dist-info/(METADATA|WHEEL|RECORD|entry_points\.txt|licenses/LICENSE)"
 )
@@ -205,7 +205,7 @@ def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, s
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert re.search(r"^results +results/mine: index.html, dataset.nc", ran.stdout + ran.stderr, re.MULTILINE)
     told = call("springtune", "info", "results/mine", **read_only)
-    assert f"{scenes} asked, {scenes} solved" in told.stdout and f"springtune {st.__version__}" in told.stdout
+    assert f"{scenes}  {scenes} solved" in told.stdout and f"springtune {st.__version__}" in told.stdout
     assert "commit" not in told.stdout  # of a tree without git
     assert "unknown" not in (call.here / "results/mine/tables/index.html").read_text()
     assert (call.here / "results/mine/index.html").stat().st_size > 100_000

@@ -6,6 +6,7 @@ import re
 import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
 from typing import Any, TextIO
 
 import click
@@ -13,6 +14,7 @@ import click
 from .. import __version__
 from ..registry import import_name
 from ..safe_io.escapes import UNSEEN, shown
+from ..studies.runs.source import is_source_tree
 
 
 def examples(*lines: str) -> str:
@@ -23,7 +25,8 @@ def examples(*lines: str) -> str:
     >>> examples("springtune definitions")
     '\x08\nExamples:\n  springtune definitions'
     """
-    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+    folder = "" if is_source_tree(Path()) else "config/"  # where `springtune new` writes
+    return "\n".join(["\b", "Examples:", *(f"  {line.replace(folder, '')}" for line in lines)])
 
 
 class WrongCall(click.ClickException):
@@ -45,6 +48,7 @@ COMMANDS = {
     "diff": ("diff", "List the values that differ between two datasets."),
     "export": ("results", "Write a group of a dataset as CSV or Parquet."),
     "archive": ("results", "Pack the results of a study into one file."),
+    "docs": ("results", "Print where the pages, the manual of studies and the examples are."),
 }
 """Modules and meanings of the commands, in the order of the help; each is imported when it is called."""
 
@@ -163,11 +167,11 @@ class Commands(click.Group):
 @click.group(
     cls=Commands,
     epilog=examples(
-        "springtune new my-study",
-        "springtune scenes config/paper.yaml",
-        "springtune run config/paper.yaml",
+        "springtune new mine",
+        "springtune scenes config/mine.yaml",
+        "springtune run config/mine.yaml",
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
-        "springtune browse results/paper",
+        "springtune browse results/mine",
     ),
     context_settings={"help_option_names": ["-h", "--help"]},
 )

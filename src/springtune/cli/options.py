@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce, wraps
@@ -16,6 +16,7 @@ from ..problem.geometry import Beam
 from ..problem.parameters import PLANES
 from ..problem.quantities import nearest, positive
 from ..safe_io.tables import mesh_size_text
+from ..studies.runs.source import is_source_tree
 
 if TYPE_CHECKING:
     from ..mesh.cells import Mesh
@@ -54,7 +55,11 @@ SPRING_FILES = (
 MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 """Young's modulus and Poisson's ratio of the paper's materials."""
 
-STUDY_EXAMPLE = "config/shapes.yaml:cook"
+STUDY_EXAMPLE = (
+    "config/shapes.yaml:cook"
+    if is_source_tree(Path())
+    else "shapes.yaml:cook, after `springtune new shapes --from shapes`"
+)
 """Example of a study's shape, for messages."""
 
 # -- options that exclude each other -----------------------------------------------------------------------------------
@@ -77,9 +82,6 @@ def check_option_pairs() -> None:
     context = click.get_current_context()
     known = {one.name or "": one.opts[0] for one in context.command.params}
     given = [name for name in known if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-    if "beam" in known and not {"beam", "study"} & {*given}:
-        missing = f"Missing option '--beam' such as 200x40, or '--study' such as {STUDY_EXAMPLE}."
-        raise click.UsageError(missing, context)
     for name in given:
         said = f"{known[name]}: '{context.params[name]}'"
         for other in given:
@@ -89,6 +91,28 @@ def check_option_pairs() -> None:
         for other in REQUIRED_OPTIONS.get(name, ()):
             if other in known and other not in given:
                 raise ValueError(f"{said} means nothing without {known[other]}; give {known[other]}, or leave it out")
+
+
+MISSING = {
+    "beam": f"beam: missing; give one such as 200x40, or --study such as {STUDY_EXAMPLE}",
+    "size": "size: missing; give the length of an edge such as '2 mm'",
+    "material": f"material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson",
+    "density": "density: missing; give one such as '1000 kg/m^3'",
+    "load": "load: missing; give one to calibrate to such as traction",
+    "force": "force: none; give the size of the force on the beam such as '0.2 N'",
+}
+"""Messages about missing options of a beam."""
+
+FOR_ENGINE = ("density", "load", "force")
+"""Options that an engine needs besides those of a beam."""
+
+
+def check_missing(given: dict[str, Any], needed: Iterable[str]) -> None:
+    """Refuse a beam with missing options; ValueError has a line for each of them."""
+    constants = given["young"] is not None and given["poisson"] is not None
+    there = {"material": given["material"] or constants or None}
+    if missing := [text for name, text in MISSING.items() if name in needed and (given | there)[name] is None]:
+        raise ValueError(*missing)
 
 
 # -- beams and shapes --------------------------------------------------------------------------------------------------
@@ -112,8 +136,6 @@ def read_material(given: Mapping[str, Any]) -> "Material":
         known = ", ".join(MATERIALS)
         raise ValueError(f"material: unknown material '{name}'; known: {known}; or give --young and --poisson")
     young, poisson = MATERIALS.get(name, (given["young"], given["poisson"]))
-    if young is None or poisson is None:
-        raise ValueError(f"material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson")
     try:
         ratio = float(poisson)
     except ValueError:
@@ -168,15 +190,21 @@ class BodyOptions:
         return self.make(self.mesh_type, self.size)
 
 
-def read_body(given: Mapping[str, Any], load: str | None, sized: bool = True) -> BodyOptions:
-    """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size."""
-    return (_read_shape_options if given["study"] else _read_beam_options)(given, load, sized)
+def read_body(
+    given: Mapping[str, Any], load: str | None, sized: bool = True, also: Collection[str] = ()
+) -> BodyOptions:
+    """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size; a beam `also` more."""
+    if given["study"]:
+        return _read_shape_options(given, load, sized)
+    generated = sized and not Path(given["mesh"] or "").is_file()
+    check_missing(dict(given), ("beam", "material", *("size",) * generated, *also))
+    return _read_beam_options(given, load, sized)
 
 
 def _size(given: Mapping[str, Any], needed: bool) -> float | None:
     """Mesh size of the options [m]."""
     if given["size"] is None and needed:
-        raise ValueError("size: missing; give the length of an edge such as '2 mm'")
+        raise ValueError(MISSING["size"])
     return None if given["size"] is None else positive(given["size"], "length", "size")
 
 

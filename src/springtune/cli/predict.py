@@ -1,5 +1,7 @@
 """Recommend a definition for one mesh, or a mesh for one error, and write springs for other programs."""
 
+import logging
+import time
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,6 +13,7 @@ import click
 
 from . import examples
 from .options import (
+    FOR_ENGINE,
     SPRING_FILES,
     BodyOptions,
     Options,
@@ -37,6 +40,31 @@ ENGINE_OPTIONS: Options = {
     "definition": {"help": "Rule for stiffness.  [default: best]"},
 }
 """Options of `predict` that are of engines, as click takes them."""
+
+PROGRESS_SECONDS = 3
+"""Time between two lines on the progress of a search [s]."""
+
+
+class Progress(logging.Handler):
+    """Prints now and then what a long search does."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.last = time.monotonic()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record, unless the last one is recent."""
+        if time.monotonic() - self.last > PROGRESS_SECONDS:
+            self.last = time.monotonic()
+            click.echo(f"{record.getMessage()} ...", err=True)
+
+
+def show_progress() -> None:
+    """Print the progress of searches."""
+    logger = logging.getLogger("springtune")
+    logger.setLevel(logging.INFO)
+    logger.handlers = [Progress()]
+
 
 Answer = tuple[str, Callable[[], "SpringNet"]]
 """Text of an answer, and a function that makes the springs that it recommends."""
@@ -98,6 +126,7 @@ def predict(
     if target is not None:
         check_target("--write", target)
     names = None if load is None else [name.strip() for name in load.split(",") if name.strip()]
+    show_progress()
     if engine["engine"] is not None:
         text, make = _answer_for_engine(sheet, engine, names or [], springs_alone)
     else:
@@ -197,10 +226,9 @@ def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: li
     names = ("dt", "substeps", "iterations", "precision")
     setting = Setting(**{name: options[name] for name in names if options[name] is not None})
     engine.check(setting)
-    body = read_body(sheet, loads[0] if loads else None)
-    if body.load is None:
-        raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
-    make = partial(Scene, body.body, body.mesh, body.material, body.load, options["force"], scale=options["scale"])
+    load = loads[0] if loads else None
+    body = read_body(sheet | {"load": load, "force": options["force"]}, load, also=FOR_ENGINE)
+    make = partial(Scene, body.body, body.mesh, body.material, str(body.load), options["force"], scale=options["scale"])
     if options["definition"] is None:
         scene, refused, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
     else:
@@ -208,12 +236,12 @@ def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: li
     if scene is None:
         raise click.ClickException(refused)
     fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)
-    text = fit_text(fit, body.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
-    return text, fit.net if fit.factor == fit.factor else partial(_refuse_without_factor, fit.message)
+    make_net = fit.net if fit.factor == fit.factor else partial(_refuse_without_factor, fit.message)
+    return fit_text(fit, body.mesh_name, tried), make_net
 
 
 def _refuse_without_factor(why: str) -> "SpringNet":
-    raise click.ClickException(f"--write: there is no factor, so nothing is written: {why}")
+    raise click.ClickException(f"--write: there is no factor, so nothing is written: {why}; give the setting above")
 
 
 # -- springs for other programs ---------------------------------------------------------------------------------------

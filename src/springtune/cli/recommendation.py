@@ -1,7 +1,7 @@
 """Texts of `springtune predict` and `springtune springs`."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -188,8 +188,8 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     )
 
 
-def fit_text(fit: "EngineFit", mesh_name: str) -> str:
-    """Text of a calibration."""
+def fit_text(fit: "EngineFit", mesh_name: str, tried: Sequence[str] = ()) -> str:
+    """Text of a calibration, which ends in what to type; with the definitions that were `tried`."""
     from ..engines.calibration import MOST_SPREAD
 
     about, mesh = fit.scene.boundary_problem, fit.scene.mesh
@@ -198,17 +198,33 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
         f"{about.named_materials}; {about.label}; definition {fit.scene.definition.name}",
         aligned(fit._table(), left=2),
     ]
+    off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > MOST_SPREAD / 2]
     if fit.bands:
         others = "" if len(fit.bands) == 1 else "; other loads give finite elements the same displacement"
         lines += ["", f"errors at parts of each load{others}:", aligned(fit.bands.table(), left=2)]
-        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > MOST_SPREAD / 2]
         if off:
             where = f"under {fit.scene.load}, but not under {', '.join(off)}"
             lines.append(f"The solver has not converged; the factor makes up for it {where}.")
     if fit.needed:
         lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
         lines.append(aligned(fit.needed.table(), left=2))
-    return "\n".join(lines)
+    lines += ["", f"Tried: {', '.join(tried)}."] if tried else []
+    return "\n".join([*lines, "", *_to_type(fit, bool(off))])
+
+
+def _to_type(fit: "EngineFit", too_narrow: bool) -> Iterator[str]:
+    """Lines of what to type with the factor, and without one if it is `too_narrow` or missing."""
+    from ..engines.calibration import CONVERGED_ERROR
+    from ..engines.run import off_text
+
+    if found := fit.factor == fit.factor:
+        yield f"type at {fit.result.setting}, for {fit.scene.load}: {fit.typed_text}"
+    best = min(fit.needed, key=lambda one: (not one.found, one.frame_seconds if one.found else abs(one.solver_error)))
+    if best.found and (too_narrow or not found):
+        yield f"type at {best.setting}, without a factor: {best.typed}"
+    elif not found:
+        yield f"no setting that was tried has a solver error below {100 * CONVERGED_ERROR:g} %; the nearest one:"
+        yield f"type at {best.setting}, {off_text(best.solver_error)} by its solver: {best.typed}"
 
 
 def written_text(net: "SpringNet", written: Iterable[Path]) -> str:

@@ -6,8 +6,9 @@ from pathlib import Path
 import click
 
 from ..registry import how_to_install
+from ..safe_io.tables import aligned
 from ..studies.output.text import bytes_text
-from ..studies.runs.source import CONFIG_FOLDER
+from ..studies.runs.source import CONFIG_FOLDER, workflow_folder
 from . import examples
 
 
@@ -93,3 +94,10 @@ def archive(folder: Path, out: Path | None, force: bool) -> None:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
     names = pack(load_study(config), folder, target)
     click.echo(f"{target}: {len(names)} files, {bytes_text(target.stat().st_size)}")
+
+
+@click.command(epilog=examples("springtune docs"))
+def docs() -> None:
+    """Print where the pages, the manual of studies and the examples are."""
+    places = {"pages": "docs/README.md", "keys of a study": "config/README.md", "examples": "examples"}
+    click.echo(aligned(((what, workflow_folder() / place) for what, place in places.items()), left=0))

@@ -48,8 +48,8 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     gc.disable()  # scenes and their tasks stay to the end: collecting garbage among them takes a sixth of the time
     named = bool(arguments) and not arguments[0].startswith("-")
     options = [*arguments[named:]]
-    if "--configfile" in options or "--configfiles" in options:
-        raise click.UsageError("give the study itself, without --configfile: springtune run config/mine.yaml")
+    if {"--configfile", "--configfiles"} & {one.partition("=")[0] for one in options}:
+        raise click.UsageError("give the study itself, without --configfile: springtune run mine.yaml")
     late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
     if late:
         first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
@@ -195,7 +195,10 @@ def _wants_slurm(options: list[str]) -> bool:
 def _suggestion(path: Path) -> str:
     """Suggestion of an existing study for a missing one, or an empty string."""
     near = config_file(f"{path.stem}.yaml")
-    return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""
+    if path.exists() or near == path or not near.is_file():
+        return ""
+    copied = f"`springtune new {path.stem} --from {path.stem}` writes it here"
+    return f"; {copied}" if near.is_absolute() else f"; did you mean {near}?"
 
 
 def _snakemake() -> list[str]:

@@ -182,6 +182,8 @@ class Engine(Declaration):
         (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
     of_setting : bool
         Whether these numbers depend on the setting: `typed` takes (net, setting).
+    springs_first : bool
+        Whether it is taken with springs alone unless a definition with energies is asked for.
     law : callable, optional
         (net, reference stiffness) -> energies of its triangles in place of the net's.
     besides : str
@@ -220,6 +222,7 @@ class Engine(Declaration):
     iterates: bool = True
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False
+    springs_first: bool = False
     law: Callable[[Net, float], list[Energy]] | None = None
     besides: str = ""
     measured: str = ""

@@ -6,6 +6,7 @@ springs are: a factor hides it for one load and not for the others, and where ``
 no factor does.
 """
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import NOT_COMPUTED, SpringNet
-from ..prediction.choices import check_loads, check_names, predicted, trial
+from ..mesh.cells import Mesh
+from ..prediction.choices import check_loads, check_names, places, predicted, trial
 from ..problem.compare import error_text
 from ..problem.loads import LOADS
 from ..problem.shapes import Shape
@@ -23,7 +25,18 @@ from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.boundary_problem import ShapeProblem, unit_reference
 from ..scene.single import Scene
 from .base import ENGINES, Engine, EngineError, Setting
-from .run import MOST_DRIFT, EngineResult, drift, in_engine, net_of, with_precision
+from .run import (
+    MOST_DRIFT,
+    EngineResult,
+    drift,
+    frame_text,
+    in_engine,
+    net_of,
+    off_text,
+    with_precision,
+)
+
+logger = logging.getLogger(__name__)
 
 LOAD_SHARES = (0.25, 0.5, 1.0, 2.0)
 """Sizes of a load that a calibration is tried on, over its own."""
@@ -54,6 +67,9 @@ CONVERGED_ERROR, STALLED_SHARE, MOST_DOUBLINGS = 0.01, 0.9, 8
 """Solver error of a converged setting, the share of it that two doublings of substeps or iterations leave where more
 are hopeless, and how many are tried."""
 
+FAR_ERROR, FAR_STEPS = 1.0, 10
+"""Solver error above which doubling begins at once at this many stable steps of explicit integrators."""
+
 
 @dataclass(frozen=True, repr=False)
 class LoadBand(Tabled):
@@ -67,7 +83,7 @@ class LoadBand(Tabled):
     errors : tuple of float
         In the engine at each size [1]; NaN where it does not come to rest.
     definition_error : float
-        Of the network's equilibrium without a factor, at the third size [1]: what a converged setting would have.
+        Of the equilibrium by the engine's law without a factor, at the third size [1]: what a converged setting has.
     message : str
         Why there is no error.
 
@@ -142,8 +158,8 @@ class NeededSetting(Tabled):
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "more", self.raised
         yield "setting", str(self.setting) if self.found else f"not reached with {self.setting}"
-        yield "solver error", error_text(self.solver_error) if self.solver_error == self.solver_error else "diverges"
-        yield "a frame", number_text(self.frame_seconds, "s")
+        yield "solver error", off_text(self.solver_error)
+        yield "a frame", frame_text(self.frame_seconds)
 
 
 @dataclass(frozen=True, repr=False)
@@ -180,7 +196,7 @@ class EngineFit(Tabled):
     >>> print(f"{fit.factor:.2f} times, {len(fit.typed['compliance'])} springs; error {100 * fit.error:+.1f} %")
     1.41 times, 205 springs; error -0.0 %
     >>> print(*fit.typed_rows())
-    ('compliance', '0.00093108 to 0.0018622', 'm/N', '1 / k of a spring')
+    ('compliance', 'inside 0.00093108, on the outline 0.0018622', 'm/N', '1 / k of a spring')
     >>> fit.net().write("tuned.csv")[0].name
     'tuned.csv'
     """
@@ -238,24 +254,29 @@ class EngineFit(Tabled):
         -------
         iterator of tuple of str
         """
-        yield from _typed_rows(ENGINES[self.result.engine], self.typed)
+        yield from _typed_rows(ENGINES[self.result.engine], self.typed, self.scene.mesh)
+
+    @property
+    def typed_text(self) -> str:
+        """Numbers to type with their units in a line."""
+        return _typed_text(self.typed_rows())
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
         yield "factor", f"{self.factor:.5g}" if self.factor == self.factor else "none"
         for name, value, unit, formula in self.typed_rows():
-            yield f"type {name}", f"{value} {unit}: {formula}"
+            yield f"type {name}", f"{_with_unit(value, unit)}: {formula}"
         yield "displacement", number_text(self.result.displacement, "m")
         yield "by finite elements", number_text(self.result.reference, "m")
-        yield "error", error_text(self.error)
+        yield "error", off_text(self.error, self.result.reference)
         if ENGINES[self.result.engine].iterates:
-            yield "in other orders", f"{error_text(self.spread[0])} to {error_text(self.spread[1])}"
-        yield "drift across", error_text(self.result.drift)
-        yield "without a factor", error_text(self.untuned.error)
+            yield "in other orders", _between(self.spread, self.result.reference)
+        yield "drift across", self.result.drift_text
+        yield "without a factor", self.untuned.parts
         yield "run", f"{self.result.status} after {self.result.frames} frames"
         yield "damping", f"{self.result.damping:.4g} 1/s, {DAMPING_NOTE}"
         yield "set besides", ENGINES[self.result.engine].besides
-        yield "a frame", f"{1e3 * self.result.frame_seconds:.3g} ms"
+        yield "a frame", frame_text(self.result.frame_seconds)
         yield "note", self.message
 
 
@@ -273,6 +294,7 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         """Run of a scene of the same springs, damped critically for the loaded mode of the material."""
         damping, rest = 2 * scene.motion().loaded_frequency, RUN_TOLERANCES[setting.precision]
         about: dict[str, Any] = {"frames": self.frames, "tolerance": rest, "damping": damping, "order": order}
+        logger.info("running %s at %s, stiffness times %.4g", scene.title, setting, factor)
         return in_engine(scene, self.engine, setting, factor=factor, **about)
 
     def orders(self, factor: float, setting: Setting) -> list[EngineResult]:
@@ -282,15 +304,17 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
 
     def spread(self, factor: float, setting: Setting) -> tuple[tuple[float, float], str]:
         """Least and largest error over these orders, and why no factor is right where they are too far apart."""
-        errors = np.array([one.error for one in self.orders(factor, setting)])
+        runs = self.orders(factor, setting)
+        errors = np.array([one.error for one in runs])
         low, high = float(errors.min()), float(errors.max())
         if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= MOST_SPREAD:
             return (low, high), ""
-        between = f"is {error_text(low)} to {error_text(high)}" if low == low else "has no end in some"
+        between = _between((low, high), runs[0].reference)
+        between = _between((low, high), runs[0].reference)
         return (low, high), (
-            f"the error at {setting} {between} in {TRIED_ORDERS} orders of the same particles, with {factor:.4g} times "
-            "the numbers of the definition: the solver has not converged, so no factor holds in other scripts; take "
-            "more substeps or iterations"
+            f"the error at {setting} is {between} in {TRIED_ORDERS} orders of the same particles, with {factor:.4g} "
+            "times the numbers of the definition: the solver has not converged, so no factor holds in other scripts; "
+            "take more substeps or iterations"
         )
 
     def ratio(self, factor: float, setting: Setting) -> float:
@@ -370,7 +394,7 @@ def fit_engine(
         raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
     spread, why = runs.spread(1.0, setting)
     factor, why = (np.nan, why) if why else _factor(runs, setting)
-    tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=_error_size)
+    tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=lambda one: _size(one.error))
     if factor == factor:
         spread, why = runs.spread(factor, setting)
         factor, tuned = (np.nan, untuned) if why else (factor, tuned)
@@ -393,14 +417,41 @@ def fit_engine(
     )
 
 
-def _typed_rows(engine: Engine, typed: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
-    """Name, value or range, unit and formula of each number to type, as texts."""
+def _typed_rows(engine: Engine, typed: Mapping[str, Any], mesh: Mesh) -> Iterator[tuple[str, str, str, str]]:
+    """Name, value or range by the place of springs, unit and formula of each number to type, as texts."""
     for name, known in engine.parameters.items():
         if name in typed:
-            values = np.ravel(typed[name])
-            values = values[np.isfinite(values)]
-            low, high = f"{values.min():.5g}", f"{values.max():.5g}"
-            yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
+            values = np.asarray(typed[name])
+            parts = {"": values}
+            if values.shape == (len(mesh.edges),):
+                parts = {f"{where} ": values[part] for where, part in places(mesh).items()}
+            each = {where: _range_text(part) for where, part in parts.items()}
+            text = ", ".join(f"{where}{value}" for where, value in each.items() if value)
+            yield name, text, known.unit, known.formula
+
+
+def _range_text(values: np.ndarray) -> str:
+    """The finite values, or their range, as text."""
+    values = values[np.isfinite(values)]
+    ends = dict.fromkeys(f"{one:.5g}" for one in (values.min(), values.max())) if len(values) else ()
+    return " to ".join(ends)
+
+
+def _with_unit(value: str, unit: str) -> str:
+    return value if unit == "1" else f"{value} {unit}"
+
+
+def _typed_text(rows: Iterable[tuple[str, str, str, str]]) -> str:
+    return "; ".join(f"{name} {_with_unit(value, unit)}" for name, value, unit, _ in rows)
+
+
+def _between(errors: tuple[float, float], reference: float) -> str:
+    """Least and largest error in words."""
+    low, high = (off_text(error, reference) for error in sorted(errors, key=abs))
+    if low == high:
+        return low
+    words = high.partition(" ")[2]
+    return f"{low.removesuffix(f' {words}') if words != '%' else low} to {high}"
 
 
 def _is_at_rest(one: EngineResult) -> bool:
@@ -408,8 +459,9 @@ def _is_at_rest(one: EngineResult) -> bool:
     return one.status == "rest" or one.status != "inverted" and one.swing <= MOST_SWING * abs(one.displacement)
 
 
-def _error_size(one: EngineResult) -> float:
-    return abs(one.error) if np.isfinite(one.error) else np.inf
+def _size(error: float) -> float:
+    """Absolute value; infinite where it diverged."""
+    return abs(error) if np.isfinite(error) else np.inf
 
 
 def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
@@ -440,7 +492,7 @@ def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
         why += "; take more substeps or iterations"
         return np.nan, f"no {what} reaches {moved}: {first:.3g} times the stiffness leaves {there} at {setting}{why}"
     brentq(error, *sorted((1 / first, 1 / last)), xtol=1e-5 / max(first, last), maxiter=60)
-    factor, best = min(((factor, one) for (factor, _), one in runs.items()), key=lambda pair: _error_size(pair[1]))
+    factor, best = min(((factor, one) for (factor, _), one in runs.items()), key=lambda pair: _size(pair[1].error))
     if not abs(best.error) <= MOST_FACTOR_ERROR:
         return np.nan, f"the displacement jumps over {moved} at {factor:.4g} times the stiffness"
     return factor, ""
@@ -469,22 +521,30 @@ def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
 
 
 def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
-    """Double substeps or iterations until the solver error is small without a factor, or stalls."""
+    """Double substeps or iterations until the solver error is small without a factor, or stalls.
+
+    Substeps are first set to `FAR_STEPS` stable steps if the error is large.
+    """
     errors: list[float] = []
+    first, tried, found = getattr(setting, raised), runs[1.0, setting], False
+    if raised == "substeps" and not abs(tried.solver_error) <= FAR_ERROR:
+        ratio = setting.step / (FAR_STEPS * runs.scene.motion().step_limit("central-difference"))
+        first *= 2 ** max(0, int(np.log2(ratio)))
     for power in range(MOST_DOUBLINGS + 1):
-        more = replace(setting, **{raised: getattr(setting, raised) * 2**power})
-        untuned = runs[1.0, more]
-        errors.append(abs(untuned.solver_error))
-        if found := _is_at_rest(untuned) and errors[-1] <= CONVERGED_ERROR:
-            untuned = max(runs.orders(1.0, more), key=lambda one: abs(np.nan_to_num(one.solver_error, nan=np.inf)))
-            errors[-1] = abs(untuned.solver_error)
-            found = errors[-1] <= CONVERGED_ERROR
-        if found or (power > 1 and errors[-1] > STALLED_SHARE * errors[-3]):
+        try:
+            tried = runs[1.0, replace(setting, **{raised: first * 2**power})]
+        except ValueError:  # more than is run
+            break
+        errors.append(_size(tried.solver_error))
+        if found := _is_at_rest(tried) and errors[-1] <= CONVERGED_ERROR:
+            tried = max(runs.orders(1.0, tried.setting), key=lambda one: _size(one.solver_error))
+            found = abs(tried.solver_error) <= CONVERGED_ERROR
+        may_stall = power > 1 and (raised == "iterations" or errors[-3] <= FAR_ERROR)
+        if found or (may_stall and errors[-1] >= STALLED_SHARE * errors[-3]):
             break
     engine = ENGINES[runs.engine]
-    rows = _typed_rows(engine, engine.numbers(net_of(runs.scene), more)) if found else ()
-    typed = ", ".join(f"{name} {value} {unit}" for name, value, unit, _ in rows)
-    return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds, typed)
+    typed = _typed_text(_typed_rows(engine, engine.numbers(net_of(runs.scene), tried.setting), runs.scene.mesh))
+    return NeededSetting(raised, tried.setting, found, tried.solver_error, tried.frame_seconds, typed)
 
 
 def _scene_under(scene: Scene, load: str, size: float) -> Scene:
@@ -512,7 +572,8 @@ def _band(runs: _Runs, load: str, tuned: EngineResult) -> LoadBand:
     errors = tuple(one.error if _is_at_rest(one) else np.nan for one in found)
     why = next((one.message for one in found if not _is_at_rest(one)), "")
     why = why or next((one.drifts for one in found if abs(one.drift) > MOST_DRIFT), "")
-    return LoadBand(load, sizes, errors, found[LOAD_SHARES.index(1.0)].definition_error, why)
+    own = found[LOAD_SHARES.index(1.0)]
+    return LoadBand(load, sizes, errors, own.definition_error + own.law_error, why)
 
 
 def best_runnable_scene(
@@ -524,8 +585,9 @@ def best_runnable_scene(
     tried, refused = trial(body, mesh, material, **about), dict[str, str]()
     while True:
         able = [one for one in tried.choices(refused) if one.worst < np.inf and not (springs_alone and one.energies)]
+        able.sort(key=lambda one: engine.springs_first and one.energies)
         if not able:
-            why = next(reversed(refused.values()), "no definition has a stable network on this mesh; take another mesh")
+            why = next(iter(refused.values()), "no definition has a stable network on this mesh; take another mesh")
             return None, why, tried.tried
         name = able[0].definition
         scene = make(definition=name)

@@ -18,6 +18,9 @@ from ..safe_io.tables import Tabled, number_text
 from ..scene.single import Result, Scene
 from .base import ENGINES, Engine, EngineError, Session, Setting, count, number
 
+MOST_PERCENTS = 2
+"""Displacement over the reference's from which its error is given in times."""
+
 MOST_DRIFT = 0.05
 """Error across what is measured, over it, above which a note warns of it, and springs are not recommended."""
 
@@ -55,6 +58,22 @@ MOST_CHANGE_RATIO = 0.99
 """Largest ratio of changes from one window to the next: slower creep counts as rest, since it may be rounding."""
 
 
+def off_text(error: float, reference: float = 0.0) -> str:
+    """Error of a displacement in words: "diverged" without one, and times instead of percents where it is large.
+
+    Without a `reference` [m] an error of any sign is too far.
+
+    Examples
+    --------
+    >>> off_text(0.02, 1e-3), off_text(-10.0, -1e-3), off_text(float("nan"), 1e-3)
+    ('+2.00 %', '11 times too far', 'diverged')
+    """
+    times = 1 + error * np.sign(reference or error)
+    if reference == reference and error != error:
+        return "diverged"
+    return f"{times:.3g} times too far" if times >= MOST_PERCENTS else error_text(error)
+
+
 @dataclass(frozen=True)
 class Ended:
     """End of a session; see `EngineResult`."""
@@ -82,7 +101,7 @@ class EngineResult(Tabled, Ended):
         Why it is not at rest; empty where it is.
     frames : int
     frame_seconds : float
-        Time that a frame took, without the first ones [s].
+        Time that a frame took, without the first one, which may compile [s]; NaN of a single frame.
     swing : float
         Largest amplitude about the mean, where it swings [m].
     scene : Scene
@@ -184,24 +203,34 @@ class EngineResult(Tabled, Ended):
     @property
     def drifts(self) -> str:
         """A sentence on `drift`."""
-        return (
-            f"moves across by {error_text(self.drift)} of what finite elements move along, which 'error' does not say"
-        )
+        return f"moves across by {self.drift_text} of what finite elements move along, which 'error' does not say"
+
+    @property
+    def drift_text(self) -> str:
+        """Text of `drift`; empty where the run diverged."""
+        return error_text(self.drift) if self.drift == self.drift else ""
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.engine}, {self.setting}"
         yield "status", self.status
         yield "reason", self.message
         yield "displacement", number_text(self.displacement, "m")
-        yield "a frame", number_text(self.frame_seconds, "s")
+        yield "a frame", frame_text(self.frame_seconds)
 
     def _computed_rows(self) -> Iterator[tuple[str, str]]:
-        yield "error", error_text(self.error)
+        yield "error", off_text(self.error, self.reference)
         yield "of it definition", error_text(self.definition_error)
         if self.by_law != self.exact:
             yield "of it law", error_text(self.law_error)
-        yield "of it solver", error_text(self.solver_error)
-        yield "drift across", error_text(self.drift)
+        yield "of it solver", off_text(self.solver_error, self.reference)
+        yield "drift across", self.drift_text
+
+    @property
+    def parts(self) -> str:
+        """Error in words, with its parts."""
+        parts = {"definition": self.definition_error, "law": self.law_error, "solver": self.solver_error}
+        each = (f"{name} {off_text(part, self.reference)}" for name, part in parts.items() if part)
+        return f"{off_text(self.error, self.reference)} ({', '.join(each)})" if self.error == self.error else "diverged"
 
 
 def in_engine(
@@ -353,16 +382,20 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
     r). A run rests where this stays below `tolerance` of the displacement, or where it oscillates by less.
     """
     seen: list[np.ndarray] = []
-    seconds: list[float] = []
+    seconds: list[float] = []  # a frame, without the first one, which may compile
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
         looks, size_of_window = [], min(window, most - done)
         each = ceil(size_of_window / LOOKS_PER_WINDOW)
         for begun in range(0, size_of_window, each):
             count = min(each, size_of_window - begun)
-            begin = time.perf_counter()
-            session.advance(count)
-            seconds.append((time.perf_counter() - begin) / count)
+            timed = count if done else count - 1
+            if not done:
+                session.advance(1)
+            if timed:
+                begin = time.perf_counter()
+                session.advance(timed)
+                seconds.append((time.perf_counter() - begin) / timed)
             done += count
             now = session.displacements()
             size = float(np.abs(now).max())
@@ -387,9 +420,9 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
             return Ended(now, "rest", "", done, _frame_seconds(seconds), 0.0)
     swing = _swing(seen[len(seen) // 2 :])
     if len(seen) > 1 and _oscillates(seen) and swing > STEADY_SWING_RATIO * _swing(seen[: len(seen) // 2]):
-        message = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
+        message = f"swings by {1e3 * swing:.3g} mm about its mean after {done} frames; take more substeps or damping"
         return Ended(_mean(seen), "swings", message, done, _frame_seconds(seconds), swing)
-    message = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
+    message = f"not at rest after {done} frames, still moving by {1e3 * change:.3g} mm in {window}; give more frames"
     return Ended(now, "moving", message, done, _frame_seconds(seconds), swing)
 
 
@@ -413,5 +446,10 @@ def _oscillates(seen: list[np.ndarray]) -> bool:
 
 
 def _frame_seconds(seconds: list[float]) -> float:
-    """Seconds a frame: the median, without the first look, which may compile."""
-    return float(np.median(seconds[1:] or seconds))
+    """Seconds a frame: the median; NaN where none was timed."""
+    return float(np.median(seconds)) if seconds else np.nan
+
+
+def frame_text(seconds: float) -> str:
+    """Time of a frame in words; empty where none was timed."""
+    return "" if seconds != seconds else f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{1e3 * seconds:.0f} ms"

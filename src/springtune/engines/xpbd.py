@@ -128,6 +128,7 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
         "incompressible compliance": Parameter("1/(N m)", "3 / (E h A0)"),
     },
     typed=compliances,
+    springs_first=True,
     measured="1e-6, twenty scenes; it falls as the step squared",
     source="Macklin 2016",
 )

@@ -560,10 +560,8 @@ IN_WORDS = (
 def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = sheet.mesh
-    outline, several = mesh.on_outline, mesh.cells_per_edge > 1
-    inside, at_outline, diagonals = (
-        _common_value(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
-    )
+    stiffness = springs.reference * springs.relative
+    inside, at_outline, diagonals = (_common_value(stiffness[part]) for part in places(mesh).values())
     extra = []
     for energy in springs.energies:
         if isinstance(energy, AreaEnergy):
@@ -574,6 +572,12 @@ def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
     if len(mesh.quads):
         extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
     return inside, at_outline, "; ".join(extra) or "none"
+
+
+def places(mesh: Mesh) -> dict[str, np.ndarray]:
+    """Which edges of a mesh are inside, on the outline, or diagonals of its cells, in words."""
+    outline, several = mesh.on_outline, mesh.cells_per_edge > 1
+    return {"inside": several, "on the outline": outline, "on diagonals": ~outline & ~several}
 
 
 def _common_value(values: np.ndarray) -> float:

@@ -7,6 +7,7 @@ The last change over a doubling of the cells may happen once more, so that the e
 meshes have whole numbers of cells across, and some sizes between, whose cells are stretched to fit.
 """
 
+import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -46,6 +47,8 @@ from .choices import (
     references,
     shape_references,
 )
+
+logger = logging.getLogger(__name__)
 
 FINEST_CELLS_RATIO, LEAST_FINER_MESHES = 2.0, 2
 """Cells across the finest mesh tried over those of the answer, and number of finer meshes tried, at least."""
@@ -495,6 +498,9 @@ class _Search:
             return known
         problems = self.family.problems(self._size(cells))
         mesh = problems[0].mesh
+        logger.info(
+            "solving %s %s: %s particles", self.family.name, mesh_size_text(self._size(cells)), len(mesh.points)
+        )
         # A mesh of its own has more particles than coarser ones and fewer than finer ones.
         others = [one for one in self.solved if one.cells == int(one.cells) != cells] if whole else []
         if any((len(mesh.points) > one.particles) != (cells > one.cells) for one in others):

@@ -21,13 +21,15 @@ def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] 
 
 
 def number_text(number: float, unit: str) -> str:
-    """Number with unit, lengths in mm.
+    """Number with unit, lengths in mm; empty for NaN.
 
     Examples
     --------
     >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
     ('5 mm', '0.3', '400000 N')
     """
+    if number != number:
+        return ""
     if unit == "m":
         return f"{1e3 * number:.6g} mm"
     return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"

@@ -4,6 +4,8 @@ import io
 import logging
 import os
 import re
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -261,3 +263,14 @@ def test_what_is_left_follows_the_rate_so_far():
     assert display.line() == "1 of 3 jobs, 1:00 min, about 2:00 min left: b"
     display.record_event(LogEvent.JOB_ERROR, 2, "")
     assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 2:00 min left"
+
+
+def test_an_interrupt_is_one_line():
+    code = (
+        "import os, signal, snakemake_logger_plugin_springtune as ours\n"
+        "signal.signal(signal.SIGINT, ours.end_quietly)\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ended.returncode and ended.stdout == ""
+    assert ended.stderr == "stopped; what is computed is kept: the same command takes up where this one stopped\n"

@@ -37,7 +37,7 @@ class StudyError(ValueError):
     ...     st.load_study("config/papers.yaml")
     ... except st.StudyError as error:
     ...     print(error)
-    config/papers.yaml: cannot be read: No such file or directory; give the path of a study such as config/paper.yaml
+    config/papers.yaml: cannot be read: No such file or directory; give the path of a study; `springtune new` writes one
     """
 
     def __init__(self, *lines: str) -> None:
@@ -259,7 +259,7 @@ MOST_VALUES = 100_000
 
 def read_study(path: str | Path) -> tuple[str, Any, Lines]:
     """Return the text, the content and the line of each key of a study."""
-    example = "give the path of a study such as config/paper.yaml"
+    example = "give the path of a study; `springtune new` writes one"
     try:
         found = read(path, LARGEST_STUDY)
     except BeyondSize:
