@@ -18,6 +18,7 @@ class Cells {
     const reset = element("button", { type: "button", class: "copy", id: "reset", text: "Reset filters", onclick: () => this.table.reset() });
     const all = element("button", { type: "button", class: "copy", id: "columns", text: "All columns", onclick: () => {
       all.textContent = this.table.holder.classList.toggle("few") ? "All columns" : "Few columns";
+      this.table.draw(true);
     } });
     const word = (row) => this.status.meaning(this.status.values[row]), rows = upTo(this.status.size).filter((row) => word(row) !== "not_requested");
     this.table = new Table({

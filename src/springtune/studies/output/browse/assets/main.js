@@ -1,9 +1,5 @@
 // The page: its head, its views, and the selection that they share with the address.
 
-function asked(tally) {
-  return tally.reduce((sum, one) => sum + one[1], 0);
-}
-
 // A view of any group: its networks, a plot of its variables, and what it holds.
 class Explorer {
   constructor(page, group, view) {
@@ -59,7 +55,7 @@ class Page {
     const [overview, study] = ["overview", "study"].map((name) => document.getElementById(name));
     this.views = overview ? { overview: { title: "Overview", holder: overview } } : {};
     const declared = (group, name) => ({ note: "", plots: [], columns: [], ...(this.declared[group.path] || { title: spoken(name) }) });
-    if (asked(root.tally())) this.views.cells = new Cells(this, declared(root, "cells"));
+    if (root.tally().length) this.views.cells = new Cells(this, declared(root, "cells"));
     else if (Object.keys(root.fields).length && !root.fields.status) this.views.cells = new Explorer(this, root, declared(root, "cells"));
     for (const group of others) this.views[group.path.slice(1)] = new Explorer(this, group, declared(group, group.path.slice(1)));
     this.views.study = { title: "Study", holder: study };
@@ -72,10 +68,10 @@ class Page {
 
   head(root) {
     const put = (id, ...children) => document.getElementById(id).append(...children.flat());
-    const count = ([word, number_]) => element("span", { class: "count" }, badge(word, number_)), all = asked(root.tally());
+    const count = ([word, number_]) => element("span", { class: "count" }, badge(word, number_)), all = root.tally().reduce((sum, one) => sum + one[1], 0);
     if (all) put("end", element("b", { text: all === 1 ? "1 scene:" : `${all} scenes:` }), root.tally().map(count),
       root.notRequested ? element("span", { class: "soft", text: `${root.notRequested} not requested` }) : "");
-    for (const group of this.counted.filter((one) => asked(one.tally()))) {
+    for (const group of this.counted.filter((one) => one.tally().length)) {
       const name = group.path.slice(1);
       put("holds", element("span", { class: "holds" }, element("a", { href: `#view=${name}`, text: this.views[name].title }), ": ", group.tally().map(count)));
     }
@@ -89,7 +85,7 @@ class Page {
       const place = upTo(root.dims[name].size).findIndex((i) => String(root.label(name, i)) === wanted.get(name));
       if (place >= 0) places[name] = place;
     }
-    if (asked(root.tally())) this.places = { ...(this.places || this.firstPlaces(root)), ...places };
+    if (root.tally().length) this.places = { ...(this.places || this.firstPlaces(root)), ...places };
     await this.open(names.includes(wanted.get("view")) ? wanted.get("view") : Object.keys(places).length ? "cells" : names[0]);
   }
 

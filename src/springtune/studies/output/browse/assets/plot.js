@@ -168,8 +168,9 @@ class Plot {
 
   // The sentence on the signs of errors, of the load that is seen.
   signOf(field) {
-    const root = window.springtune.groups["/"], seen = this.choose && ![this.plot.x, this.plot.by].includes("load");
-    const size = seen ? root.fields.reference_displacement?.of(root.placesFrom(this.group, this.chosen) || {}) : 0;
+    const { group, plot } = this, known = group.fields.reference_displacement || window.springtune.groups["/"].fields.reference_displacement;
+    const seen = known && field.name === SCENE_ERROR && ![plot.x, plot.by].includes("load");
+    const size = seen ? known.of(known.group.placesFrom(group, this.chosen) || {}) : 0;
     return field.sign && size ? `${size > 0 ? "positive" : "negative"}: too soft` : field.sign;
   }
 

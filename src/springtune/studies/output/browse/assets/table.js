@@ -100,7 +100,8 @@ class Table {
     const seen = `${first} ${last} ${this.chosen}`;
     if (seen === this.seen && !anew) return;
     this.seen = seen;
-    const gap = (rows, text = "") => element("tr", { class: "gap" }, element("td", { colspan: this.columns.length, style: `height:${rows * ROW}px`, text }));
+    const shown = this.columns.filter((one) => !one.more || !this.holder.classList.contains("few")).length;
+    const gap = (rows, text = "") => element("tr", { class: "gap" }, element("td", { colspan: shown, style: `height:${rows * ROW}px`, text }));
     const rows = this.order.slice(first, last).map((row, i) => this.row(row, first + i));
     this.body.replaceChildren(gap(first), ...rows, gap(this.order.length - last, this.order.length ? "" : "No row passes the filters."));
     if (this.placeOf.has(this.chosen)) this.holder.setAttribute("aria-activedescendant", `row-${this.chosen}`);

@@ -65,7 +65,8 @@ function withUnit(one, value, text) {
 
 function labelText(dim, place) {
   const label = dim.labels ? dim.labels[place] : place;
-  return typeof label === "number" ? written(dim, label, 6) : String(label);
+  if (typeof label === "number") return written(dim, label, 6);
+  return String(label).replace(/-plane-(?=stress$|strain$)/, ", plane ").replace("neo-hooke,", "neo-Hooke,");
 }
 
 function labelWithUnit(dim, place) {
