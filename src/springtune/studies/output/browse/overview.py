@@ -3,6 +3,7 @@
 `assets/overview.html` shows it without a script.
 """
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 from springtune.problem.compare import error_text
 from springtune.problem.status import Status
 
-from ..answers import Answer, Columns, DefinitionErrors, Variables, definition_errors, requested_cells, what_to_type
+from ..answers import Columns, DefinitionErrors, Variables, definition_errors, requested_cells, what_to_type
 from ..text import label_text, range_text
 
 Content = dict[str, Any]
@@ -42,6 +43,9 @@ LOOKS = 8
 
 SMALLEST_PERCENT = 1e-4
 """Smaller errors stand at the end of their axis."""
+
+SHORTEST_TIME = 1e-6
+"""Shorter times [s] stand at the end of their axis."""
 
 LARGEST_CURVE_PERCENT = 60.0
 """Largest error of a sensitivity curve."""
@@ -84,7 +88,7 @@ class Chart(NamedTuple):
     x: Axis
     y: Axis | None
     rows: Sequence[tuple[float, str, str]] = ()  # place, name and numbers, instead of an axis
-    lines: Sequence[tuple[int, str, Sequence[tuple[float, float]]]] = ()  # look, name and points
+    lines: Sequence[tuple[int, Sequence[tuple[float, float]]]] = ()  # look and points
     dots: Sequence[tuple[str, float, float, str]] = ()  # look, place and text
     names: Mapping[str, int] = {}  # looks of lines or dots
     title: str = ""
@@ -112,38 +116,30 @@ def _errors(source: Source, cells: Columns) -> Content:
     """What to type, errors of definitions, and errors over run time."""
     found = sorted(definition_errors(cells), key=lambda one: one.median)
     answers = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
-    content = {"source": source, "answers": [[*map(_answer, pair)] for pair in answers[:MOST_ANSWERS]],
-               "further": len(answers) - MOST_ANSWERS}  # fmt: skip
+    content: Content = {"source": source, "answers": answers[:MOST_ANSWERS], "further": len(answers) - MOST_ANSWERS}
     if found:
         percents = np.maximum(100 * np.abs(cells["valid_error"]), SMALLEST_PERCENT)
         content["errors"] = _dots(found, percents, cells[source.by], cells["valid_error"])
         if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
-            seconds = cells["solve_seconds"] + cells["definition_seconds"]
             pairs = {*zip(cells[source.body].tolist(), cells["mesh_size"].tolist())}
             alike = len(pairs) == len({body for body, _ in pairs}) * len({size for _, size in pairs})
             # Where each body has mesh sizes of its own, medians by mesh size would be of different bodies.
-            sizes = cells["mesh_size"] if alike else np.full(len(seconds), np.nan)
-            content["times"] = _times(found[:LOOKS], percents, sizes, seconds)
+            sizes = [_size(size) if alike else "" for size in cells["mesh_size"].tolist()]
+            seconds = np.nan_to_num(cells["solve_seconds"] + cells["definition_seconds"])
+            content["times"] = _times(found[:LOOKS], percents, np.array(sizes), seconds)
     return content
-
-
-def _answer(answer: Answer) -> Content:
-    """Texts on what to type."""
-    parts = {"inside": answer.inside, "on the outline": answer.outline}
-    typed = {
-        where: range_text(values).replace("e+0", "e").replace("e+", "e")
-        for where, values in parts.items()
-        if values.size
-    }
-    errors = answer.errors
-    error = f"error {error_text(errors[0])}" if len(errors) == 1 else f"median error {100 * answer.median_error:.2g} %"
-    ratio = f"{answer.ratio:.3g} E t" if np.isfinite(answer.ratio) else ""
-    said = {"size": _size(answer.mesh_size), "typed": typed, "ratio": ratio, "error": error}
-    return answer._asdict() | said
 
 
 def _size(mesh_size: float) -> str:
     return label_text("mesh_size", mesh_size, "m")
+
+
+def _stiffnesses(values: np.ndarray) -> str:
+    return re.sub(r"e\+0?", "e", range_text(values)) + " N/m"
+
+
+FILTERS = {"size": _size, "stiffnesses": _stiffnesses, "error": error_text}
+"""Filters of the template."""
 
 
 def _dots(found: Sequence[DefinitionErrors], percents: np.ndarray, labels: np.ndarray, errors: np.ndarray) -> Chart:
@@ -163,29 +159,21 @@ def _dots(found: Sequence[DefinitionErrors], percents: np.ndarray, labels: np.nd
     return Chart(x, None, rows, dots=dots, names=names)
 
 
-def _times(
-    found: Sequence[DefinitionErrors], percents: np.ndarray, sizes: np.ndarray, seconds: np.ndarray
-) -> Chart | None:
-    """Median error over median run time, a line a definition through its mesh sizes; NaN for all of them."""
-    medians: dict[str, list[tuple[str, float, float]]] = {}
+def _times(found: Sequence[DefinitionErrors], percents: np.ndarray, sizes: np.ndarray, seconds: np.ndarray) -> Chart:
+    """Median error over median run time, a line a definition through its mesh sizes."""
+    medians = {}
     for one in found:
-        for size in np.unique(sizes[one.places]):
-            same = (sizes[one.places] == size) | np.isnan(size)
-            own = one.places[same & (seconds[one.places] > 0)]
-            if own.size:
-                name = ", ".join((*one.labels, *([] if np.isnan(size) else [_size(size)])))
-                row = (name, float(np.median(seconds[own])), float(np.median(percents[own])))
-                medians.setdefault(", ".join(one.labels), []).append(row)
-    if not medians:
-        return None
+        parts = {size: one.places[sizes[one.places] == size] for size in dict.fromkeys(sizes[one.places].tolist())}
+        medians[", ".join(one.labels)] = [(size, float(np.median(seconds[places])), float(np.median(percents[places])))
+                                          for size, places in parts.items()]  # fmt: skip
     _, times, errors = zip(*(row for rows in medians.values() for row in rows))
-    x, y = Axis("run time [s]", times, log=True), Axis(ERROR_AXIS, errors, log=True)
+    x, y = Axis("run time [s]", np.maximum(times, SHORTEST_TIME), log=True), Axis(ERROR_AXIS, errors, log=True)
     lines, dots = [], []
     for look, (name, rows) in enumerate(medians.items()):
-        places = [(x.at(time), y.at(error)) for _, time, error in rows]
-        lines.append((look, name, places))
-        dots += [(f"look{look}", *place, f"{text}: {error:.2g} %, {time:.2g} s")
-                 for place, (text, time, error) in zip(places, rows)]  # fmt: skip
+        places = [(x.at(max(time, SHORTEST_TIME)), y.at(error)) for _, time, error in rows]
+        texts = [f"{name}, {size}: {error:.2g} %, {time:.2g} s".replace(", :", ":") for size, time, error in rows]
+        lines.append((look, places))
+        dots += [(f"look{look}", *place, text) for place, text in zip(places, texts)]
     return Chart(x, y, lines=lines, dots=dots, names={name: look for look, name in enumerate(medians)})
 
 
@@ -208,7 +196,7 @@ def _curves(curves: Variables) -> Content:
         for cell, place in members[:MOST_LINES]:
             size = _size(cell["mesh_size"])
             points, marks = _curve(curves, place, x)
-            lines.append((looks[size], "", points))
+            lines.append((looks[size], points))
             for name, at, stiffness in marks:
                 text = f"{cell['beam']}, {size}, {name}: {stiffness:.4g} N/m"
                 dots.append((f"{name} look{looks[size]}", at, CURVE_AXIS.at(0), text))

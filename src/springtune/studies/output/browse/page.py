@@ -31,7 +31,7 @@ from .. import reading
 from ..answers import broadcast
 from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
 from . import View
-from .overview import GROUPS, overview
+from .overview import FILTERS, GROUPS, overview
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
@@ -64,6 +64,7 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("springtune.studies.output.browse", "assets"), autoescape=True, trim_blocks=True
     )
+    environment.filters |= FILTERS
     return environment.get_template("page.html").render(
         title=attributes.get("title") or attributes.get("study") or "Study",
         policy=f"{policy}; form-action 'none'",
