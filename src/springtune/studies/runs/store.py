@@ -1,8 +1,9 @@
 """Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
-Scalars and texts are one JSON text, since HDF5 attributes cost more than solving; arrays are datasets. Former results
-stay. Structures have checksums by the file format ``latest``, data by the filter Fletcher-32, and a file has its name
-in it, so that damaged and exchanged files are found.
+Scalars and texts are one JSON text, since HDF5 attributes cost more than solving. Arrays of a label that are written
+together and have one shape are rows of a dataset; the JSON text also has their places. Former results stay.
+Structures have checksums by the file format ``latest``, data by the filter Fletcher-32, and a file has its name in
+it, so that damaged and exchanged files are found.
 """
 
 import io
@@ -10,6 +11,7 @@ import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     import h5py
 
 SCALARS = "scalars"
+
+Places = dict[str, dict[str, tuple[str, int]]]
+"""Dataset and row of arrays, by key and label."""
 
 
 class DamagedError(Exception):
@@ -37,18 +42,18 @@ class DamagedError(Exception):
 
 
 @contextmanager
-def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]]]]":
-    """Context of a file, and its scalars."""
+def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]], Places]]":
+    """Context of a file, its scalars by key and label, and the places of its arrays."""
     import h5py  # here: a plan reads no results
 
     if not Path(path).exists():
         raise DamagedError(path, "it is missing")
     try:
         with h5py.File(path) as file:
-            name, scalars = json.loads(file[SCALARS][()].tobytes())
+            name, scalars, places = json.loads(file[SCALARS][()].tobytes())
             if name != Path(path).name:
                 raise ValueError(f"it is {name}")
-            yield file, scalars
+            yield file, scalars, places
     except (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError) as error:
         reason = str(error).strip("'\"").partition("\n")[0]
         raise DamagedError(path, f"it is damaged ({reason})") from None
@@ -64,12 +69,14 @@ def stored_keys(path: str | Path) -> set[str]:
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """Read results."""
     names = list(names)
-    with _opened(path) as (file, scalars):
+    with _opened(path) as (file, scalars, places):
         lacking = sum(name not in scalars for name in names)
         results = {name: dict(scalars[name]) for name in names if name in scalars}
-        for name, result in results.items() if fields else ():
-            if name in file:
-                result |= {label: file[name][label][()] for label in fields if label in file[name]}
+        dataset = cache(file.__getitem__)
+        for name, result in results.items():
+            for label in places[name].keys() & set(fields):
+                stack, row = places[name][label]
+                result[label] = dataset(stack)[row]
     if lacking:
         raise DamagedError(path, f"it lacks {lacking} of {len(names)} results")
     return results
@@ -77,7 +84,7 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
 
 def read_all(path: str | Path) -> dict[str, dict[str, Any]]:
     """Read the scalars of all results of a file."""
-    with _opened(path) as (_, scalars):
+    with _opened(path) as (_, scalars, _places):
         return scalars
 
 
@@ -129,27 +136,32 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     import h5py  # here: a plan reads no results
 
     scalars: dict[str, dict[str, Any]] = {}
+    places: Places = {}
+    stacks: dict[tuple[str, tuple[int, ...], np.dtype], list[tuple[str, np.ndarray]]] = {}
     # In memory: what is on the disk is written at once. The image of an open file has a stale checksum before HDF5 2.
     image = io.BytesIO()
     with h5py.File(image, "w", libver="latest") as file:
         if stored_keys(path):
-            with _opened(path) as (before, known):
-                scalars = {name: kept for name, kept in known.items() if name not in results}
-                for name in before:
-                    if name in scalars:
-                        before.copy(name, file)
+            with _opened(path) as (before, scalars, places):
+                for stack in before.keys() - {SCALARS}:
+                    before.copy(stack, file)
         for name, result in results.items():
-            scalars[name] = {}
+            scalars[name], places[name] = {}, {}
             for label, value in result.items():
                 if isinstance(value, np.ndarray) and value.ndim:
-                    _put(file, f"{name}/{label}", value)
+                    stacks.setdefault((label, value.shape, value.dtype), []).append((name, value))
                 else:
                     scalars[name][label] = value.item() if isinstance(value, np.generic | np.ndarray) else value
-        _put(file, SCALARS, np.frombuffer(json.dumps([Path(path).name, scalars]).encode(), np.uint8))
+        for (label, _, _), members in stacks.items():
+            stack = f"{label}_{len(file)}"
+            places |= {name: places[name] | {label: (stack, row)} for row, (name, _) in enumerate(members)}
+            _put(file, stack, np.stack([value for _, value in members]))
+        content = json.dumps([Path(path).name, scalars, places]).encode()
+        _put(file, SCALARS, np.frombuffer(content, np.uint8)[np.newaxis])
     atomic.write_bytes(path, image.getvalue())
 
 
-def _put(file: "h5py.File", name: str, array: np.ndarray) -> None:
-    """Store an array in one chunk, with its checksum; an empty one has nothing to check."""
-    chunked = {"chunks": array.shape, "fletcher32": True} if array.size else {}
-    file.create_dataset(name, data=array, **chunked)
+def _put(file: "h5py.File", name: str, rows: np.ndarray) -> None:
+    """Store arrays, each in one chunk with its checksum; empty ones have nothing to check."""
+    chunked = {"chunks": (1, *rows.shape[1:]), "fletcher32": True} if rows.size else {}
+    file.create_dataset(name, data=rows, **chunked)
