@@ -114,6 +114,11 @@ class Mesh:
                 first = f"{(~(areas > 0)).sum()}, the first one {cell} at {where}; turn them, or remove them"
                 raise MeshError(f"cells of {count} corners that are clockwise or have no area: {first}")
 
+    def __repr__(self) -> str:
+        named = ("triangles", self.triangles), ("quads", self.quads)
+        cells = ", ".join(f"{len(corners)} {name}" for name, corners in named if len(corners))
+        return f"Mesh({len(self.points)} points, {len(self.edges)} edges, {cells})"
+
     @property
     def cells(self) -> dict[int, np.ndarray]:
         """Corner indices of the cells by number of corners, those kinds that the mesh has."""

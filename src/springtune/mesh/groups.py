@@ -46,6 +46,11 @@ class GroupedMesh:
     parts: Mapping[str, Mapping[int, np.ndarray]] = field(default_factory=dict)
     unusable: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        groups = {"sides": self.sides, "points": self.points, "parts": self.parts}
+        named = (f"{what} {', '.join(names)}" for what, names in groups.items() if names)
+        return f"GroupedMesh({'; '.join([repr(self.mesh), *named])})"
+
     def particle(self, name: str) -> int | None:
         """Return the particle at a named point.
 

@@ -573,6 +573,10 @@ class Shape:
     file: str = ""
     unit: Number = 1.0
 
+    def __repr__(self) -> str:
+        made_of = f"file {self.file}" if self.file else f"sides: {len(self.outline)}, holes: {len(self.holes)}"
+        return f"Shape({self.name}, {made_of}, loads {', '.join(self.loads) or 'none'})"
+
     def __post_init__(self) -> None:
         _check_name(self.name, "shape")
         what = f"shape {self.name!r}"

@@ -83,6 +83,10 @@ class TestCombinations:
         assert study.swept == ("force",)
         assert study.axes["force"] == (1.0, 2.0, 3.0, 10.0)
 
+    def test_forces_of_each_load_go_with_it(self, load):
+        study = load(load=["traction", "bending"], force={"traction": ["1 N", "2 N"], "bending": "10 N"})
+        assert {(one.load, one.force) for one in study.scenes} == {("traction", 1), ("traction", 2), ("bending", 10)}
+
     def test_too_many_are_refused_before_they_are_made(self, refusal, monkeypatch):
         many = {"mesh_size": {"from": "2 mm", "to": "5 mm", "points": "10000"}}
         monkeypatch.setenv(MOST_SCENES_VARIABLE, "9999")

@@ -97,9 +97,10 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
                 what = f"material '{material}' is in plane strain, and this ratio is {INCOMPRESSIBLE}"
                 problems.add((*path, "poisson_ratio"), what)
         if isinstance(grid.force, dict):
-            for beam in dict.fromkeys(grid.beam):
-                if beam not in grid.force:
-                    problems.add((*path, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
+            for owner in dict.fromkeys(getattr(grid, grid.force_owner)):
+                if owner not in grid.force:
+                    what = f"no force for {grid.force_owner} '{owner}'; add '{owner}: <force>'"
+                    problems.add((*path, "force"), what)
     seen = set()
     for number, row in enumerate(stated_rows(config)):
         where = ("definitions", "paper", "stiffness", number)

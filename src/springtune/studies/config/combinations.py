@@ -25,7 +25,7 @@ SAME_VALUE = 1e-9
 
 
 def factors(grid: GridConfig) -> list[Factor]:
-    """Factors whose product is all combinations of a grid; forces of each beam go with the beam."""
+    """Factors whose product is all combinations of a grid; forces by beam, material or load go with it."""
     columns = tuple(grid.rows[1:])
     names = [name for name in GRID_PARAMETERS if getattr(grid, name) and name not in columns]
     found: list[Factor] = []
@@ -33,10 +33,10 @@ def factors(grid: GridConfig) -> list[Factor]:
         if group != ("force",) or not isinstance(grid.force, dict):
             found.append((group, list(zip(*(getattr(grid, name) for name in group), strict=True))))
     if isinstance(grid.force, dict):
-        place = next(number for number, (group, _) in enumerate(found) if "beam" in group)
+        place = next(number for number, (group, _) in enumerate(found) if grid.force_owner in group)
         group, rows = found[place]
-        beam = group.index("beam")
-        found[place] = (*group, "force"), [(*row, force) for row in rows for force in grid.force.get(row[beam], ())]
+        owner = group.index(grid.force_owner)
+        found[place] = (*group, "force"), [(*row, force) for row in rows for force in grid.force.get(row[owner], ())]
     return found
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection
 from functools import partial
+from itertools import chain
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -107,15 +108,13 @@ def one_of(what: str, names: Collection[str]) -> Notes:
     return AfterValidator(known), WithJsonSchema({"enum": list(names)}), Field(title=title)
 
 
-def declared(what: str, section: str, beside: Collection[str] = ()) -> AfterValidator:
-    """Note of a name that a section of the study declares; the context of validation has its sections."""
+def declared(what: str, *sections: str, beside: Collection[str] = ()) -> AfterValidator:
+    """Note of a name that sections of the study declare; the context of validation has them."""
 
     def known(name: str, info: ValidationInfo) -> str:
-        names = () if info.context is None else info.context.get(section, ())
-        if info.context is not None and names is not None and name not in names and name not in beside:
-            raise refuse(
-                f"unknown {what} {show(name)}; {nearest(name, [*beside, *names])}; or declare it under {section}"
-            )
+        found = [() if info.context is None else info.context.get(section, ()) for section in sections]
+        if info.context is not None and None not in found and name not in (names := [*beside, *chain(*found)]):
+            raise refuse(f"unknown {what} {show(name)}; {nearest(name, names)}; or declare it under {sections[0]}")
         return name
 
     return AfterValidator(known)
@@ -147,7 +146,7 @@ Flag = Annotated[bool, Field(title="true or false")]
 MeshType = Annotated[
     str,
     Field(title="a mesh type such as 'structured'", examples=list(MESH_TYPES)),
-    declared("mesh type", "mesh_files", MESH_TYPES),
+    declared("mesh type", "mesh_files", beside=MESH_TYPES),
 ]
 MadeType = Annotated[str, *one_of("mesh type", MESH_TYPES)]
 Load = Annotated[str, *one_of("load", LOADS)]
@@ -255,10 +254,15 @@ Forces = Numbers[Force]
 Stresses = Numbers[Stress]
 PoissonRatios = Numbers[PoissonRatio]
 Ratios = Numbers[Ratio]
-BeamForces = Annotated[
-    Annotated[Forces, Tag("of all")] | Annotated[dict[BeamName, Forces], Field(min_length=1), Tag("of each")],
+ForceOwner = Annotated[
+    str,
+    Field(title="the name of a beam, material or load"),
+    declared("beam, material or load", "beams", "materials", beside=LOADS),
+]
+GridForces = Annotated[
+    Annotated[Forces, Tag("of all")] | Annotated[dict[ForceOwner, Forces], Field(min_length=1), Tag("of each")],
     Discriminator(lambda value: "of each" if isinstance(value, dict) and not RANGE_KEYS & value.keys() else "of all"),
-    Field(title="a force such as '400 kN', a list, or a range; or these for each beam"),
+    Field(title="a force such as '400 kN', a list, or a range; or these for each beam, material or load"),
 ]
 
 # -- sections by name --------------------------------------------------------------------------------------------------

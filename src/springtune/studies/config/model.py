@@ -159,6 +159,10 @@ class Study:
     swept: tuple[str, ...] = ()  # parameters of `SWEPT` that are dimensions
     files: tuple[Path, ...] = ()  # that it names
 
+    def __repr__(self) -> str:
+        scenes = len(self.scenes) + len(self.shapes.scenes if self.shapes else ())
+        return f"Study({self.name}, {scenes} scenes: {self.title})"
+
     @property
     def plane_strain(self) -> tuple[str, ...]:
         """Names of the declared materials in plane strain."""

@@ -284,7 +284,7 @@ class GridConfig(Section):
     clamped: `shear` acts along x on the upper side, which stays level; `pressure` and `follower-pressure` press it
     down."""
 
-    force: fields.BeamForces | None = None
+    force: fields.GridForces | None = None
     """Size of the force. The load gives the sign. Several forces on one beam and material in one load are a dimension
     of the dataset."""
 
@@ -303,12 +303,19 @@ class GridConfig(Section):
     stiffness_scale: fields.Ratios | None = None
     """Factors on all stiffnesses and energies of a definition."""
 
+    @property
+    def force_owner(self) -> str:
+        """Key of the grid that its forces belong to, `beam`, `material` or `load`; empty if they are for all."""
+        if not isinstance(self.force, dict):
+            return ""
+        return next((name for name in ("material", "load") if self.force.keys() & {*getattr(self, name)}), "beam")
+
     @model_validator(mode="after")
     def _check_force(self) -> Self:
         if (self.force is None) == (self.pressure is None):
             both = "both 'force' and 'pressure'; remove one"
             pressed = all(LOADS[load].kind.pressed for load in self.load)
-            remedy = "one for each beam" + (", or 'pressure'" if pressed else "")
+            remedy = "one for each beam, material or load" + (", or 'pressure'" if pressed else "")
             missing = f"'force' is missing; give a force such as '400 kN', or {remedy}"
             raise refuse(missing if self.force is None else both, *(() if self.force is None else ("pressure",)))
         for load in self.load if self.pressure is not None else ():

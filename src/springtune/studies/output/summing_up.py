@@ -28,6 +28,9 @@ DEFINITIONS_LISTED = 8
 
 ROOT_GROUP = "/"
 
+COMPARED = {"": ("deformation_error", "reference_displacement"), "shapes": ("error", "reference_value")}
+"""Error and reference of groups whose definitions are compared."""
+
 
 FINITE_STRAIN_GROUP = "/finite_strain"
 """Group of references for nonlinear kinematics."""
@@ -42,8 +45,10 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _count_words(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
-    if ROOT_GROUP in groups:
-        lines += _answers(groups[ROOT_GROUP], groups.get(FINITE_STRAIN_GROUP), most)
+    for name, data in groups.items():
+        if name.strip("/") in COMPARED:
+            finite = groups.get(FINITE_STRAIN_GROUP) if name == ROOT_GROUP else None
+            lines += _answers(data, finite, most, *COMPARED[name.strip("/")])
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
@@ -109,39 +114,46 @@ def _cell_lines(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - len(told)} more"
 
 
-def _answers(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> Iterator[str]:
+def _answers(
+    data: xr.Dataset, finite: xr.Dataset | None, most: int | None, error: str, reference: str
+) -> Iterator[str]:
     """Errors of definitions, and what to type."""
-    if "definition" in root.get("deformation_error", root).dims:
-        own, other = _variables(root), None if finite is None else _variables(finite)
-        cells = requested_cells(own, other)
-        yield from _errors(cells, root, other, most)
-        yield from _stiffness_to_type(cells)
+    if "definition" in data.get(error, data).dims:
+        own, other = _variables(data), None if finite is None else _variables(finite)
+        cells = requested_cells(own, other, error)
+        yield from _errors(cells, data[error], cells[reference], other, most)
+        if error == "deformation_error":  # of shapes quantities have errors
+            yield from _stiffness_to_type(cells)
 
 
 def _variables(data: xr.Dataset) -> Variables:
     return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
 
 
-def _errors(cells: Columns, root: xr.Dataset, finite: Variables | None, most: int | None) -> Iterator[str]:
+def _errors(
+    cells: Columns, error: xr.DataArray, reference: np.ndarray, finite: Variables | None, most: int | None
+) -> Iterator[str]:
     """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
     found = sorted(definition_errors(cells), key=lambda one: -one.errors.max())
     if found:
         yield from (
             "",
-            "deformation errors, (network - reference) / |reference|, of solved scenes within the reference",
+            f"{str(error.name).replace('_', ' ')}s, (network - reference) / |reference|, of solved scenes within the "
+            "reference",
         )
         if finite is not None and has_own_law(finite):
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         by = [name for name in ("definition", "kinematics") if name in cells]
-        others = [str(name) for name in root.status.dims if name not in by]
-        units = {name: str(root[name].attrs.get("units", "1")) for name in others}
+        others = [str(name) for name in error.dims if name not in by]
+        units = {name: str(error[name].attrs.get("units", "1")) for name in others}
         rows = []
         for one in found[:most]:
             worst, place = float(cells["valid_error"][one.worst]), {name: cells[name][one.worst] for name in others}
-            word = sign_word(worst, float(cells["reference_displacement"][one.worst]))
+            kind = str(cells["quantity_kind"][one.worst]) if "quantity_kind" in cells else "displacement"
+            word = sign_word(worst, float(reference[one.worst]), kind)
             numbers = [f"{100 * one.median:.3g} %", f"{100 * worst:+.3g} %"]
             rows.append([*one.labels, len(one.errors), *numbers, word, cell_text(place, units)])
-        heads = [*by, "scenes", "median", "worst", "", "at"]
+        heads = [*by, "values" if "quantity" in others else "scenes", "median", "worst", "", "at"]
         yield from aligned([heads, *rows], 2, range(len(by), len(by) + 3)).splitlines()
     if most is not None and len(found) > most:
         yield f"  and of {len(found) - most} more at most {100 * found[most].errors.max():.2f} %"

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import SWEPT
 
@@ -192,6 +193,20 @@ SHAPE_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "mater
 
 SHAPE_ERRORS = ("error", "expected_error", "reference_error_estimate")
 
+FITTING_UNITS = {"m": {"mm": 1e-3, "um": 1e-6}, "Pa": {"MPa": 1e6, "kPa": 1e3}, "m2": {"mm2": 1e-6}, "J": {"mJ": 1e-3}}
+"""Units of quantities for readers, the largest first."""
+
+
+def _in_fitting_unit(row):
+    """Row of a quantity in the largest unit in which its reference, or itself, is above a tenth; the error's sign."""
+    row["sign"] = sign_word(row["error_percent"], row["reference"], row.pop("kind"))
+    sizes = (abs(row[name]) for name in ("reference", "expected", "value"))
+    size = next((one for one in sizes if one > 0), 1.0)
+    units = FITTING_UNITS.get(row["units"], {row["units"]: 1.0})
+    unit = next((name for name, factor in units.items() if size >= 0.1 * factor), [*units][-1])
+    scaled = {name: row[name] / units[unit] for name in ("value", "reference", "expected")}
+    return row | scaled | {"units": unit, "status": STATUS[row["status"]]}
+
 
 def _shape_table(tree):
     """Table of the quantities of shapes."""
@@ -201,13 +216,14 @@ def _shape_table(tree):
     columns = {"mesh_size_mm": ("mesh_size", 1e3), "particles": ("particles", 1), "value": ("value", 1)}
     columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
     columns |= {f"{name}_percent": (name, 100) for name in SHAPE_ERRORS}
+    columns |= {"sign": ("quantity_kind", 1), "kind": ("quantity_kind", 1)}
     columns |= {name: (name, 1) for name in ("status", "message")}
-    rows = [row | {"status": STATUS[row["status"]]} for row in table_rows(data, present, SHAPE_COLUMNS, columns)]
+    rows = [_in_fitting_unit(row) for row in table_rows(data, present, SHAPE_COLUMNS, columns)]
     cited = (one for one in records(data, present, ["source"]) if one["source"])
     sources = dict.fromkeys(f"{one['shape']}, {one['quantity']}: {one['source']}" for one in cited)
     strained = tree.attrs.get("plane_strain")
     note = (
-        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress "
+        "Quantities of interest of the networks; the reference is small-strain plane stress "
         f"{f'(plane strain of {strained}) ' if strained else ''}by converged finite elements on the same shape, and "
         "errors are signed: (network − reference) / |reference|, and the same against published values."
     )
