@@ -136,8 +136,8 @@ def _describe(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[st
     rows: list[dict[str, Any]] = []
     sizes: dict[str, int] = {}
     for name, stored in own.items():
-        sizes |= dict(zip(stored.dimensions, stored.shape))
         if stored.dimensions == (name,):
+            sizes[name] = len(stored)
             continue
         row: dict[str, Any] = {"name": name, "dims": list(stored.dimensions)} | _words_on(stored)
         if "flag_meanings" in stored.attrs:
@@ -145,6 +145,7 @@ def _describe(group: h5netcdf.Group, own: Variables, root: Variables) -> dict[st
             flags = np.ravel(stored.attrs.get("flag_values", range(len(meanings)))).tolist()
             row["flags"] = dict(zip(map(str, flags), meanings))
         values = _values(stored)  # each read, packed and forgotten
+        sizes |= dict(zip(stored.dimensions, values.shape))
         if name == "status":
             values = _mark_beyond_linear(own, row, values)
         elif ERROR.search(name) and row.get("units", "1") == "1":
@@ -169,10 +170,14 @@ def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
 
 
 def _read(group: h5netcdf.Group, root: h5netcdf.File) -> dict[str, tuple[Sequence[str], np.ndarray]]:
-    """Dimensions and values of a group's variables, and of the labels that it shares with the root."""
+    """Dimensions and values of a group's numbers, and of labels, also those that it shares with the root."""
     dims = {name for stored in group.variables.values() for name in stored.dimensions}
     labels = {name: root.variables[name] for name in dims if name in root.variables}
-    return {name: (stored.dimensions, _values(stored)) for name, stored in (labels | dict(group.variables)).items()}
+    found = {}
+    for name, stored in (labels | dict(group.variables)).items():
+        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf":
+            found[name] = (stored.dimensions, _values(stored))
+    return found
 
 
 def _values(stored: h5netcdf.Variable) -> np.ndarray:
