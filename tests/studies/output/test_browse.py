@@ -125,7 +125,7 @@ class TestOverview:
         tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
         text = page(tmp_path / "dataset.nc")
         found = re.search(r'<section id="overview".*?</section>\n<noscript>', text, re.DOTALL)[0]
-        return " ".join(re.sub(r"<[^>]*>", "", found.replace("</span>", " ")).split())
+        return " ".join(re.sub(r"<[^>]*>", "", re.sub("</(span|td|th)>", " ", found)).split())
 
     def solved(self, definition, error, inside, outline, **more):
         """Row of a solved scene."""
@@ -150,6 +150,17 @@ class TestOverview:
         assert "patch, linear 0.05 %; +0.10 %" in said and "paper, linear 20 %; −20 %" in said
         assert "Medians of each mesh size; a line joins them. Run time: deriving" in said
         assert "Predicted" not in said and "The paper's tables" not in said  # no curve, nothing printed
+
+    def test_the_papers_table_stands_beside_ours(self, tmp_path):
+        printed = {"beam": "100x20", "mesh_type": "free", "mesh_size": 1e-3, "material": "steel", "load": "traction"}
+        printed |= {"paper_table": 2, "paper_reference_displacement": 9.5e-4, "paper_displacement": 1.1e-3}
+        printed |= {"paper_deformation_error": 0.1579, "paper_remark": "the error does not fit"}
+        rows = [self.solved("paper", 0.05, 1.7e8, 1.7e8, stiffness=1.7e8), self.solved("patch", 1e-3, 1.78e8, 8.9e7)]
+        said = self.said(tmp_path, [printed, *rows])
+        table = said[said.index("Table 2") :]
+        assert table.startswith("Table 2: traction, free, steel") and "paper, linear" in table
+        assert "100x20 1 0.950 1.10 15.79* 1.000 +5.00 +0.10" in table
+        assert "* marks where the print contradicts itself" in table
 
     def test_where_nothing_is_solved_it_says_so(self, tmp_path):
         failed = {"status": Status.FAILED, "message": "refuses the mesh", "stiffness_inside": 1.7e8}

@@ -38,6 +38,9 @@ SOURCES = (
 GROUPS = {*(source.group for source in SOURCES), "/finite_strain", "/sensitivity"}
 """Groups that the overview reads."""
 
+REMARK = "paper_remark"
+"""Variable that says where the print contradicts itself."""
+
 LOOKS = 8
 """Different colours of lines and dots."""
 
@@ -233,7 +236,7 @@ def _paper_tables(cells: Columns) -> Content:
         title = f"Table {cell['paper_table']:g}: {cell['load']}, {cell['mesh_type']}, {cell['material']}"
         row = tables.setdefault(title, {}).setdefault((cell["beam"], f"{1e3 * cell['mesh_size']:.4g}"), {
             "printed": (f"{1e3 * cell['paper_reference_displacement']:.3f}", f"{1e3 * cell['paper_displacement']:.2f}",
-                        f"{100 * cell['paper_deformation_error']:.2f}"),
+                        f"{100 * cell['paper_deformation_error']:.2f}" + "*" * bool(cell.get(REMARK))),
             "reference": f"{1e3 * cell['reference_displacement']:.3f}", "errors": {},
         })  # fmt: skip
         if cell["kinematics"] == kinematics.get(cell["definition"]):

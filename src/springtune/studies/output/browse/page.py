@@ -31,7 +31,7 @@ from .. import reading
 from ..answers import broadcast
 from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
 from . import View
-from .overview import FILTERS, GROUPS, overview
+from .overview import FILTERS, GROUPS, REMARK, overview
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
@@ -170,12 +170,12 @@ def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
 
 
 def _read(group: h5netcdf.Group, root: h5netcdf.File) -> dict[str, tuple[Sequence[str], np.ndarray]]:
-    """Dimensions and values of a group's numbers, and of labels, also those that it shares with the root."""
+    """Dimensions and values of a group's numbers and labels, and of those labels that it shares with the root."""
     dims = {name for stored in group.variables.values() for name in stored.dimensions}
     labels = {name: root.variables[name] for name in dims if name in root.variables}
     found = {}
     for name, stored in (labels | dict(group.variables)).items():
-        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf":
+        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf" or name == REMARK:
             found[name] = (stored.dimensions, _values(stored))
     return found
 
