@@ -12,7 +12,15 @@ import numpy as np
 from springtune.problem.compare import error_text
 from springtune.problem.status import Status
 
-from ..answers import Columns, DefinitionErrors, Variables, definition_errors, requested_cells, what_to_type
+from ..answers import (
+    Columns,
+    DefinitionErrors,
+    Variables,
+    definition_errors,
+    has_own_law,
+    requested_cells,
+    what_to_type,
+)
 from ..text import label_text, range_text
 
 Content = dict[str, Any]
@@ -103,8 +111,9 @@ def overview(groups: Mapping[str, Variables]) -> Content:
     for source in SOURCES:
         group = groups.get(source.group, {})
         if {source.error, "status", "definition"} <= {*group}:
-            finite = groups.get("/finite_strain") if source.group == "/" else None
-            found.append(_errors(source, requested_cells(group, finite, source.error)))
+            finite = groups.get("/finite_strain", {}) if source.group == "/" else {}
+            content = _errors(source, requested_cells(group, finite, source.error))
+            found.append(content | {"finite_strain": has_own_law(finite)})
     return {
         "sources": found,
         "curves": _curves({**root, **curves}) if "deformation_error" in curves else {},
