@@ -32,7 +32,7 @@ def error(mesh, material):
         return np.nan
     network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative)
     fields = unit_fields(mesh)
-    stiffness = work_of(fields, [network.linear_forces(field) for field in fields], mesh) * springs.reference
+    stiffness = work_of(fields, [network.linear_forces_over_k(field) for field in fields], mesh) * springs.reference
     values, vectors = np.linalg.eigh(material.plane_stress)
     root = vectors / np.sqrt(values)
     return np.abs(np.linalg.eigvalsh(root.T @ stiffness @ root) - 1).max()

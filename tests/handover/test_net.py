@@ -275,7 +275,7 @@ def test_a_state_of_a_motion_is_written(tmp_path):
     moved = motion.run("central-difference", 0.5 * motion.step_limit("central-difference"), 30).displacements
     grid = meshio.read(*scene.write(tmp_path / "swing.vtu", moved))
     assert (grid.point_data["displacement"][:, :2] == moved).all() and "error" not in grid.point_data
-    forces = scene.springs.reference * scene.network.spring_forces(moved)
+    forces = scene.springs.reference * scene.network.spring_forces_over_k(moved)
     assert (grid.cell_data["force"][0] == forces).all()
 
 

@@ -218,7 +218,7 @@ def test_tangent_is_the_derivative_of_the_resistance(seed, amplitude, mesh_type)
     direction = network.reduce(bent(problem, seed + 1, 1.0))
     step = 1e-6 * amplitude
     moved = step * network.expand(direction)
-    difference = (network.resistance(here + moved) - network.resistance(here - moved)) / (2 * step)
+    difference = (network.free_forces_over_k(here + moved) - network.free_forces_over_k(here - moved)) / (2 * step)
     exact = network.tangent(here) @ direction
     # Central differences leave step^2 (here 1e-12 of the bend) and rounding of forces over the step.
     assert np.linalg.norm(difference - exact) <= 1e-7 * np.linalg.norm(exact)
@@ -231,9 +231,9 @@ def test_resistance_is_the_derivative_of_the_energy(seed, amplitude):
     network = problem.network
     here, direction = bent(problem, seed, amplitude), bent(problem, seed + 1, amplitude)
     step = 1e-4
-    difference = network.energy(here + step * direction) - network.energy(here - step * direction)
-    work = network.resistance(here) @ network.reduce(direction)
-    scale = np.linalg.norm(network.resistance(here)) * np.linalg.norm(direction)
+    difference = network.energy_over_k(here + step * direction) - network.energy_over_k(here - step * direction)
+    work = network.free_forces_over_k(here) @ network.reduce(direction)
+    scale = np.linalg.norm(network.free_forces_over_k(here)) * np.linalg.norm(direction)
     assert abs(difference / (2 * step) - work) <= 1e-6 * scale
 
 
@@ -245,8 +245,8 @@ def test_rigid_motion_meets_no_resistance(angle, shift):
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     displacements = points @ turn.T + np.array(shift) - points
     # Coordinates of size 1 are rounded to 1e-16, over springs of 5 mm.
-    assert np.abs(problem.network.resistance(displacements)).max() <= 1e-9 * 5e-3
-    assert problem.network.energy(displacements) <= (1e-9 * 5e-3) ** 2
+    assert np.abs(problem.network.free_forces_over_k(displacements)).max() <= 1e-9 * 5e-3
+    assert problem.network.energy_over_k(displacements) <= (1e-9 * 5e-3) ** 2
 
 
 def test_pivots_beside_the_diagonal_are_not_counted():

@@ -212,7 +212,7 @@ def test_springs_turned_far_are_solved_in_load_steps(turn, in_steps):
     angle = 2 * np.arcsin(turn / 2)
     displacements = np.array([[0.0, 0.0], [np.cos(angle) - 1, np.sin(angle)], [0.0, 0.0]])
     pattern = np.zeros((3, 2))
-    pattern[1] = network.resistance(displacements)
+    pattern[1] = network.free_forces_over_k(displacements)
     problem = Starts(network, pattern)
     found = problem.nonlinear(1.0)
     assert found.converged

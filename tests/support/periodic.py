@@ -64,4 +64,4 @@ def affine_stiffness(mesh, springs):
     """
     network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
     fields = unit_fields(mesh)
-    return work_of(fields, [network.linear_forces(field) for field in fields], mesh)
+    return work_of(fields, [network.linear_forces_over_k(field) for field in fields], mesh)

@@ -198,7 +198,7 @@ class EngineResult(Tabled, Ended):
         network, reference = self.scene.network, self.factor * self.scene.springs.reference
         load = network.reduce(self.scene.forces) / reference
         with np.errstate(over="ignore", invalid="ignore"):
-            return float(np.linalg.norm(load - network.resistance(self.displacements)) / np.linalg.norm(load))
+            return float(np.linalg.norm(load - network.free_forces_over_k(self.displacements)) / np.linalg.norm(load))
 
     @property
     def drifts(self) -> str:

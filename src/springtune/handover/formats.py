@@ -326,7 +326,7 @@ def write_displaced(path: str | Path, scene: Scene, displacements: np.ndarray, c
             of_particles |= {"reference_displacement": reference, "error": displacements - reference}
             strain = "finite" if scene.finite_strain and not scene.objection else "small"
             net.header["reference"] = scene.objection or f"finite elements, {strain} strain, converged"
-    forces = scene.springs.reference * scene.network.spring_forces(displacements, scene.kinematics == "linear")
+    forces = scene.springs.reference * scene.network.spring_forces_over_k(displacements, scene.kinematics == "linear")
     numbers = {"displacement_of_the_load": scene.displacement_of(displacements)}
     write_vtu_with(path, net, of_particles, {"force": forces}, numbers)
     return [path]

@@ -131,7 +131,9 @@ class Body:
         load = network.reduce(share * self.forces)
         if self.pressure is not None:
             load = load + share * self.force * network.reduce(self.pressure.forces(moved))
-        resistance = network.linear_resistance(moved) if self.moves_little else network.resistance(moved)
+        resistance = (
+            network.linear_free_forces_over_k(moved) if self.moves_little else network.free_forces_over_k(moved)
+        )
         return load - self.reference * resistance
 
     def tangent(self, share: float, more: sparray | None = None) -> csc_array:

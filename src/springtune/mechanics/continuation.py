@@ -81,7 +81,7 @@ def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, sca
         displacements = problem.moved(at, network.expand(u))
         load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
-            missing = at * load - network.resistance(displacements)
+            missing = at * load - network.free_forces_over_k(displacements)
             size = np.linalg.norm(missing)
         if not np.isfinite(size):
             return None

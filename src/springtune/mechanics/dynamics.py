@@ -188,9 +188,9 @@ class Motion(Moving):
         """Kinetic energy, plus that of the network, less the work of the load [J]."""
         kinetic = 0.5 * float((self.inertia * velocities**2).sum())
         if self.linear:
-            stored = 0.5 * float((displacements * self.network.linear_forces(displacements)).sum())
+            stored = 0.5 * float((displacements * self.network.linear_forces_over_k(displacements)).sum())
         else:
-            stored = self.network.energy(displacements)
+            stored = self.network.energy_over_k(displacements)
         return self.reference * (kinetic + stored - float((self.load * displacements).sum()))
 
     def residual(self, displacements: np.ndarray, start: np.ndarray | None = None) -> float:

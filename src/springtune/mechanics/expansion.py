@@ -52,7 +52,7 @@ class Expansion:
             self.coefficients[0] = displacements
         self.loads = np.array([s, 1.0])
         # Component by component, shape (order + 1, 2, n_springs): sums over orders are then of whole rows.
-        self._d = (network.rest_vectors + network.stretch(self.coefficients[0])).T[None].copy()
+        self._d = (network.rest_vectors + network.end_differences(self.coefficients[0])).T[None].copy()
         self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
         self._inverse = 1.0 / self._length
         self._first = np.zeros(0)
@@ -87,7 +87,7 @@ class Expansion:
                 loads[n] = -(change @ self._first) / (self._first @ self._first)
                 change += loads[n] * self._first
             coefficients[n] = network.expand(change)
-            d[n] = network.stretch(coefficients[n]).T
+            d[n] = network.end_differences(coefficients[n]).T
             along = np.einsum("ji,ji->i", d[0], d[n]) * inverse[0]
             length[n] += along
             inverse[n] -= inverse[0] ** 2 * along

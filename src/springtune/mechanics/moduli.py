@@ -154,7 +154,7 @@ class PatchTest:
         """Displacements [m] whose free directions are in equilibrium with the given held ones."""
         if not network.unknowns:
             return given
-        return given - network.expand(network.rest_factor.solve(network.linear_resistance(given)))
+        return given - network.expand(network.rest_factor.solve(network.linear_free_forces_over_k(given)))
 
     @cached_property
     def strip_fault(self) -> str:
@@ -187,7 +187,9 @@ class PatchTest:
         held = self._frame[0]
         network = self._network("frame", held, springs)
         fields = unit_fields(self.mesh)
-        return work_of(fields, [network.linear_forces(self._relaxed(network, field)) for field in fields], self.mesh)
+        return work_of(
+            fields, [network.linear_forces_over_k(self._relaxed(network, field)) for field in fields], self.mesh
+        )
 
     def axial(self, springs: Elastic) -> tuple[float, float]:
         """Return E t over the reference stiffness and nu [1]: along x between rollers for a strip.
@@ -202,12 +204,12 @@ class PatchTest:
         mesh, (left, right, held, given) = self.mesh, self._rollers
         network = self._network("rollers", held, springs)
         moved = self._relaxed(network, given)
-        force = network.linear_forces(moved)[right, 0].sum()
+        force = network.linear_forces_over_k(moved)[right, 0].sum()
         height = mesh.area / (mesh.points[right, 0].mean() - mesh.points[left, 0].mean())
         stress = force / height
         if springs.lateral:
             pushed = network.expand(network.rest_factor.solve(network.reduce(lateral_forces(mesh))))
-            own = network.linear_forces(pushed)[right, 0].sum() * springs.lateral
+            own = network.linear_forces_over_k(pushed)[right, 0].sum() * springs.lateral
             stress = force / (height - own)
             moved += stress * springs.lateral * pushed
         strain = mean_gradient(mesh, moved)
@@ -217,7 +219,7 @@ class PatchTest:
         """Return G t over the reference stiffness [1] under even shear of the whole outline."""
         held, given = self._frame
         network = self._network("frame", held, springs)
-        return float((network.linear_forces(self._relaxed(network, given)) * given).sum()) / self.mesh.area
+        return float((network.linear_forces_over_k(self._relaxed(network, given)) * given).sum()) / self.mesh.area
 
 
 def lateral_forces(mesh: Mesh) -> np.ndarray:

@@ -4,8 +4,9 @@ A spring of stiffness k_e and rest length L_e, with distance vector d and length
 l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
 
 Scaling: a network has relative stiffnesses, each spring's over one reference stiffness k [N/m]. Forces are computed
-over k, so their unit is m, and energies over k in m2; ``s = F / k`` is the load. One solution in s serves all forces
-and reference stiffnesses of equal F/k. Multiply a force or an energy by k to have it in N or J.
+over k, so their unit is m, and energies over k in m2 (names end in ``_over_k``); ``s = F / k`` is the load. One
+solution in s serves all forces and reference stiffnesses of equal F/k. Multiply a force or an energy by k to have it
+in N or J.
 
 A network may have energies besides its springs, see `springtune.mechanics.energies`.
 """
@@ -163,7 +164,7 @@ class Network:
         """Entries of a field of shape (n_points, 2) that belong to unknowns."""
         return self._pattern.reduce(vectors)
 
-    def stretch(self, displacements: np.ndarray) -> np.ndarray:
+    def end_differences(self, displacements: np.ndarray) -> np.ndarray:
         """Difference of the displacements of each spring's ends [m], shape (n_springs, 2)."""
         return displacements.take(self.second, axis=0) - displacements.take(self.first, axis=0)
 
@@ -173,11 +174,11 @@ class Network:
 
     # -- mechanics --------------------------------------------------------------------------------------------------
 
-    def resistance(self, displacements: np.ndarray) -> np.ndarray:
+    def free_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force against displacements over k [m], shape (unknowns,)."""
-        return self.reduce(self.forces(displacements))
+        return self.reduce(self.forces_over_k(displacements))
 
-    def forces(self, displacements: np.ndarray) -> np.ndarray:
+    def forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force against displacements at all particles over k [m], shape (n_points, 2)."""
         total = np.zeros(self.held.shape)
         if self.has_springs:
@@ -191,7 +192,7 @@ class Network:
 
         Elongations are ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose digits at small strain.
         """
-        relative = self.stretch(displacements)
+        relative = self.end_differences(displacements)
         vectors = self.rest_vectors + relative
         squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
         return vectors, np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), squares
@@ -203,10 +204,10 @@ class Network:
             pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
         return pull[:, None] * vectors
 
-    def spring_forces(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
+    def spring_forces_over_k(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
         """Return axial spring forces over k, tension positive [m]; energies are left out."""
         if linear:
-            along = np.einsum("ij,ij->i", self.rest_vectors, self.stretch(displacements))
+            along = np.einsum("ij,ij->i", self.rest_vectors, self.end_differences(displacements))
             return self.stiffness * along / self.rest_lengths
         _, lengths, squares = self._spring_vectors(displacements)
         return self.stiffness * squares / (lengths + self.rest_lengths)
@@ -219,7 +220,7 @@ class Network:
         total = np.zeros(self.held.shape)
         if linear:
             normals = self.rest_vectors / self.rest_lengths[:, None]
-            apart = self.stretch(displacements)
+            apart = self.end_differences(displacements)
             sizes = np.abs((self.stiffness * np.einsum("ij,ij->i", normals, apart))[:, None] * normals)
             if self.energies:
                 sizes = sizes + np.einsum("abn,bn->na", np.abs(self._rest_couplings), np.abs(apart.T))
@@ -230,14 +231,14 @@ class Network:
         total += self._pattern.sum_springs(sizes, -sizes)
         return np.finfo(float).eps * self.reduce(total)
 
-    def linear_resistance(self, displacements: np.ndarray) -> np.ndarray:
+    def linear_free_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force against displacements in linear kinematics over k [m], shape (unknowns,)."""
-        return self.reduce(self.linear_forces(displacements))
+        return self.reduce(self.linear_forces_over_k(displacements))
 
-    def linear_forces(self, displacements: np.ndarray) -> np.ndarray:
+    def linear_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Forces of a linear network against displacements, with held directions [m], shape (n_points, 2)."""
         normals = self.rest_vectors / self.rest_lengths[:, None]
-        apart = self.stretch(displacements)
+        apart = self.end_differences(displacements)
         pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
         resistance = -self._pattern.sum_springs(pull[:, None] * normals)
         if self.energies:
@@ -251,7 +252,7 @@ class Network:
     def _rest_couplings(self) -> np.ndarray:
         return self._pattern.cell_couplings(self.energies)
 
-    def energy(self, displacements: np.ndarray) -> float:
+    def energy_over_k(self, displacements: np.ndarray) -> float:
         """Energy of the network over k [m2]."""
         _, lengths, squares = self._spring_vectors(displacements)
         springs = 0.5 * float(self.stiffness @ (squares / (lengths + self.rest_lengths)) ** 2)
@@ -289,7 +290,7 @@ class Network:
             vectors, ratio = self.rest_vectors, np.ones(len(self.rest_lengths))
             squares = self.rest_lengths**2
         else:
-            vectors = self.rest_vectors + self.stretch(displacements)
+            vectors = self.rest_vectors + self.end_differences(displacements)
             squares = np.einsum("ij,ij->i", vectors, vectors)
             ratio = self.rest_lengths / np.sqrt(squares)
         along = self.stiffness * ratio / squares
@@ -462,7 +463,7 @@ class Network:
 
     def largest_change(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's vector over its length at rest [1]."""
-        changes = self.stretch(displacements)
+        changes = self.end_differences(displacements)
         return float(np.sqrt(np.einsum("ij,ij->i", changes, changes) / self.rest_lengths**2).max())
 
     def inverted(self, displacements: np.ndarray) -> bool:

@@ -104,8 +104,8 @@ class LoadedNetwork:
         self._dead = None if dead is None or follower is None else network.reduce(dead)
         if given is not None:
             # A first scale, to refine the linear solution, whose own forces are the final one.
-            self.load_norm += float(np.linalg.norm(network.linear_resistance(given)))
-            forces = np.where(network.held, network.linear_forces(self.slope), 0.0)
+            self.load_norm += float(np.linalg.norm(network.linear_free_forces_over_k(given)))
+            forces = np.where(network.held, network.linear_forces_over_k(self.slope), 0.0)
             self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
 
     @cached_property
@@ -113,14 +113,14 @@ class LoadedNetwork:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
 
         def balance(slope: np.ndarray) -> tuple[np.ndarray, float]:
-            missing = self.load - self.network.linear_resistance(slope)
+            missing = self.load - self.network.linear_free_forces_over_k(slope)
             return missing, norm(missing) / self.load_norm
 
         network, factor = self.network, self.network.rest_factor
         if self.given is None:
             first = network.expand(factor.solve(self.load))
         else:
-            first = self.given + network.expand(factor.solve(self.load - network.linear_resistance(self.given)))
+            first = self.given + network.expand(factor.solve(self.load - network.linear_free_forces_over_k(self.given)))
         here, error = refine(network, Iterate(first, *balance(first)), factor, balance, linear=True)
         return here.displacements, here.residual, error
 
@@ -162,7 +162,7 @@ class LoadedNetwork:
 
     def balance(self, s: float, displacements: np.ndarray) -> tuple[np.ndarray, float]:
         """Return load less resistance [m], shape (unknowns,), and its norm over that of the load [1]."""
-        missing = s * self.load_at(displacements) - self.network.resistance(displacements)
+        missing = s * self.load_at(displacements) - self.network.free_forces_over_k(displacements)
         return missing, norm(missing) / (abs(s) * self.load_norm)
 
     def load_at(self, displacements: np.ndarray) -> np.ndarray:

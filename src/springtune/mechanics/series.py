@@ -186,7 +186,7 @@ class StablePath:
         size = before = np.inf
         for _ in range(MAX_CORRECTIONS):
             with np.errstate(over="ignore", invalid="ignore"):
-                missing = s * self.problem.load - network.resistance(displacements)
+                missing = s * self.problem.load - network.free_forces_over_k(displacements)
                 step = network.expand(factor.solve(missing))
                 before, size = size, float(np.linalg.norm(step) / np.linalg.norm(displacements))
             if not size < before:
@@ -212,7 +212,9 @@ class StablePath:
         """Largest change of a spring's length from one place to another, over that at rest [1]."""
         network = self.problem.network
         lengths = [
-            np.linalg.norm(network.rest_vectors + network.stretch(np.broadcast_to(field, network.held.shape)), axis=1)
+            np.linalg.norm(
+                network.rest_vectors + network.end_differences(np.broadcast_to(field, network.held.shape)), axis=1
+            )
             for field in (before, displacements)
         ]
         return float((np.abs(lengths[1] - lengths[0]) / network.rest_lengths).max())
@@ -293,7 +295,7 @@ class StablePath:
     def _is_on_other_path(self, s: float) -> bool:
         """Return whether the series about rest now follows another, unstable path."""
         network, displacements = self.problem.network, self._rest.at(s)[1]
-        missing = s * self.problem.load - network.resistance(displacements)
+        missing = s * self.problem.load - network.free_forces_over_k(displacements)
         near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
         return near and not network.is_stable(displacements)
 

@@ -72,7 +72,7 @@ class Moving:
         """Derivative of the dampers' forces by the velocities [s], the springs turned by displacements [m]; or None."""
         if self.dampers is None or self.linear:
             return self.damper_matrix
-        along = self.network.rest_vectors + self.network.stretch(displacements)
+        along = self.network.rest_vectors + self.network.end_differences(displacements)
         along = along / np.linalg.norm(along, axis=1)[:, None]
         apart = np.concatenate([along, -along], axis=1)
         matrices = self.dampers[:, None, None] * apart[:, :, None] * apart[:, None, :]
@@ -85,13 +85,13 @@ class Moving:
             return 0.0
         if self.linear:
             return self.damper_matrix @ network.reduce(v)
-        along = network.rest_vectors + network.stretch(u)
-        rate = np.einsum("ij,ij->i", along, network.stretch(v)) / np.einsum("ij,ij->i", along, along)
+        along = network.rest_vectors + network.end_differences(u)
+        rate = np.einsum("ij,ij->i", along, network.end_differences(v)) / np.einsum("ij,ij->i", along, along)
         return -network.gather((self.dampers * rate)[:, None] * along)
 
     def missing(self, displacements: np.ndarray) -> np.ndarray:
         """Load less resistance [m], shape (unknowns,)."""
-        resist = self.network.linear_resistance if self.linear else self.network.resistance
+        resist = self.network.linear_free_forces_over_k if self.linear else self.network.free_forces_over_k
         with np.errstate(over="ignore", invalid="ignore"):
             return self.network.reduce(self.load) - resist(displacements)
 

@@ -31,7 +31,7 @@ def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> 
     place = mesh.points if linear else mesh.points + displacements
     vectors = place[network.second] - place[network.first]
     lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-    pull = network.spring_forces(displacements, linear) / lengths
+    pull = network.spring_forces_over_k(displacements, linear) / lengths
     pull /= np.maximum(mesh.cells_per_edge, 1)  # bonds are of no cell
     # Components xx, yy and xy of each edge's share.
     virial = np.stack([vectors[:, 0] ** 2, vectors[:, 1] ** 2, vectors[:, 0] * vectors[:, 1]], axis=1) * pull[:, None]

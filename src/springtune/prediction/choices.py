@@ -472,7 +472,7 @@ class Trial:
         if any(one.kind == "stress" for one in first.case.quantities):  # that is of single springs
             return name
         motion = np.random.default_rng(0).standard_normal(self.mesh.points.shape)
-        forces = springs.reference * self._sheet.network(first.loading.held, springs).linear_forces(motion)
+        forces = springs.reference * self._sheet.network(first.loading.held, springs).linear_forces_over_k(motion)
         for other, known in self._forces.items():
             if np.linalg.norm(forces - known) <= EQUAL_FORCES * np.linalg.norm(known):
                 return other

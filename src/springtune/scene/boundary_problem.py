@@ -162,8 +162,8 @@ class BoundaryProblem(ABC):
             return _growth(self.mesh, moved, linear)
         if one.kind == "energy":
             if linear:
-                return float(0.5 * springs.reference * np.tensordot(moved, network.linear_forces(moved), axes=2))
-            return springs.reference * network.energy(moved)
+                return float(0.5 * springs.reference * np.tensordot(moved, network.linear_forces_over_k(moved), axes=2))
+            return springs.reference * network.energy_over_k(moved)
         if one.kind == "reaction":
             weights = reaction_weights(self.grouped, self.case, one)
             return float(np.tensordot(self.reactions(springs, network, moved), weights, axes=2))
@@ -177,7 +177,9 @@ class BoundaryProblem(ABC):
 
     def reactions(self, springs: Springs, network: Network, moved: np.ndarray) -> np.ndarray:
         """Forces of the supports on the particles [N], shape (n_points, 2); zero in free directions."""
-        resistance = network.linear_forces(moved) if self.kinematics == "linear" else network.forces(moved)
+        resistance = (
+            network.linear_forces_over_k(moved) if self.kinematics == "linear" else network.forces_over_k(moved)
+        )
         load, turning = self.loading.pattern, self.loading.follower
         if turning is not None and self.loading.dead is not None:
             load = self.loading.dead + turning.forces(moved)

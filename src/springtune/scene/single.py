@@ -565,7 +565,7 @@ class Result(Tabled):
     @property
     def spring_forces(self) -> np.ndarray:
         """Axial force of each spring [N], tension positive, shape (n_springs,); energies' part left out."""
-        forces = self.scene.network.spring_forces(self.displacements, self.scene.kinematics == "linear")
+        forces = self.scene.network.spring_forces_over_k(self.displacements, self.scene.kinematics == "linear")
         return self.scene.springs.reference * forces
 
     def reference(self) -> "AnyReference":

@@ -101,7 +101,7 @@ class LoadSpace:
         return np.stack([self.network.reduce(field) for field in fields], axis=1)
 
     def _stretched(self, fields: Iterable[np.ndarray]) -> np.ndarray:
-        return np.stack([(self.normals * self.network.stretch(field)).sum(axis=1) for field in fields], axis=1)
+        return np.stack([(self.normals * self.network.end_differences(field)).sum(axis=1) for field in fields], axis=1)
 
     def _deformed(self, fields: Iterable[np.ndarray]) -> np.ndarray:
         moved = self._roots * np.stack([field.ravel() for field in fields], axis=1)

@@ -38,5 +38,5 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     network = Network(mesh, tested_body(mesh), found.relative)
     tension = material.young_modulus * thickness / (1 - 1 / 3) / found.reference
     moved = network.expand(network.rest_factor.solve(network.reduce(tension * outline_forces(mesh, np.eye(2)))))
-    growth = np.einsum("ij,ij->i", network.rest_vectors, network.stretch(moved)) / network.rest_lengths**2
+    growth = np.einsum("ij,ij->i", network.rest_vectors, network.end_differences(moved)) / network.rest_lengths**2
     return Springs(found.reference, not_negative(found.relative * growth), evaluations=1)

@@ -151,7 +151,7 @@ class Misfit:
                 normals = network.rest_vectors / network.rest_lengths[:, None]
                 for number in range(len(cases)):
                     stretches = [
-                        np.einsum("ij,ij->i", normals, network.stretch(network.expand(field[:, number])))
+                        np.einsum("ij,ij->i", normals, network.end_differences(network.expand(field[:, number])))
                         for field in (found, adjoint)
                     ]
                     slope -= relative * stretches[0] * stretches[1]

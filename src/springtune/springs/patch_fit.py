@@ -85,7 +85,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         loads = [network.reduce(force) for force in forces]
         moved = [network.rest_factor.solve(load) for load in loads]
         normals = network.rest_vectors / network.rest_lengths[:, None]
-        pulled = [(normals * network.stretch(network.expand(field))).sum(axis=1) for field in moved]
+        pulled = [(normals * network.end_differences(network.expand(field))).sum(axis=1) for field in moved]
         elongations = np.sqrt(network.stiffness)[:, None] * np.stack(pulled, axis=1)
         slope = -twice * elongations[:, first] * elongations[:, second]
         missing = (

@@ -95,7 +95,7 @@ def _solve_problem(about, springs, seconds, task):
     result |= {f"stiffness_{part}": value for part, value in about.sheet.typical_stiffness(springs).items()}
     if task.get("keep_fields") and found.equilibrium.converged:
         moved = found.equilibrium.displacements
-        forces = found.problem.network.spring_forces(moved, task["kinematics"] == "linear")
+        forces = found.problem.network.spring_forces_over_k(moved, task["kinematics"] == "linear")
         result |= {"displacements": moved, "spring_stiffnesses": springs.reference * springs.relative}
         result["spring_forces"] = springs.reference * forces
     return found, result

@@ -349,7 +349,7 @@ def _refined_solution(problem, s, displacements):
     load[~network.held] = s * problem.load
     for _ in range(12):
         missing = load.copy()
-        pulls = (network.stiffness * (normals * network.stretch(moved)).sum(axis=1))[:, None] * normals
+        pulls = (network.stiffness * (normals * network.end_differences(moved)).sum(axis=1))[:, None] * normals
         np.add.at(missing, network.first, pulls)
         np.subtract.at(missing, network.second, pulls)
         moved = moved + network.expand(network.rest_factor.solve(network.reduce(missing).astype(float)))
