@@ -52,8 +52,8 @@ SPRING_FILES = (
 )
 """Endings of files of springs, for the help."""
 
-MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
-"""Young's modulus and Poisson's ratio of the paper's materials."""
+MATERIALS = {"steel": ("210 GPa", "0.3"), "aluminium": ("70 GPa", "0.33"), "rubber": ("1 MPa", "0.5")}
+"""Young's modulus and Poisson's ratio of the paper's materials, and of aluminium."""
 
 STUDY_EXAMPLE = (
     "config/shapes.yaml:cook"
@@ -133,8 +133,8 @@ def read_material(given: Mapping[str, Any]) -> "Material":
 
     name = given["material"]
     if name and name not in MATERIALS:
-        known = ", ".join(MATERIALS)
-        raise ValueError(f"material: unknown material '{name}'; known: {known}; or give --young and --poisson")
+        known = nearest(str(name), MATERIALS)
+        raise ValueError(f"material: unknown material '{name}'; {known}; or give --young and --poisson")
     young, poisson = MATERIALS.get(name, (given["young"], given["poisson"]))
     try:
         ratio = float(poisson)

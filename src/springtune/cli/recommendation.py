@@ -81,6 +81,7 @@ def prediction_text(subject: Subject, mesh_name: str, counts: str, choices: "Seq
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
+        *(f"type for {name}: {_stiffness(one)}" for name, one in best.items()),
         *([f"at worst: {', '.join(_worst(subject, one) for one in best.values())}"] if best else []),
         "",
         aligned(rows, left=2, right=range(3, len(rows[0]) - 1)),
@@ -106,6 +107,14 @@ def recommended(choices: "Sequence[Choice]") -> "tuple[Choice | None, Choice | N
     """Best choice, and best choice with springs alone, or None."""
     solved = [choice for choice in choices if choice.worst < math.inf]
     return next(iter(solved), None), next((choice for choice in solved if not choice.energies), None)
+
+
+def _stiffness(choice: "Choice") -> str:
+    """Text on the stiffness of a choice."""
+    if math.isnan(choice.inside):
+        return "one for each spring, see --write"
+    besides = "" if choice.extra == "none" else f", {choice.extra.replace('; ', ', ')}"
+    return f"{choice.inside:.5g} N/m inside, {choice.outline:.5g} N/m on the outline{besides}"
 
 
 def _worst(subject: Subject, choice: "Choice") -> str:

@@ -461,7 +461,7 @@ class SceneSprings(Springs):
 
 @dataclass(frozen=True, repr=False)
 class Result(Tabled):
-    """The answer of a scene.
+    r"""The answer of a scene.
 
     Attributes
     ----------
@@ -497,7 +497,7 @@ class Result(Tabled):
     >>> print(f"error {100 * result.error:+.2f} %, {result.sign_word}", result.sign_words, list(result.errors))
     error +3.52 %, too soft {'displacement': 'too soft'} ['displacement']
     >>> result.write("traction.vtu")[0].name, result.plot().get_title(loc="left")
-    ('traction.vtu', 'traction of 400000 N, lattice\\n9.835 mm against 9.501 mm by finite elements, +3.52 % too soft')
+    ('traction.vtu', 'traction of 400000 N, lattice\n9.835 mm against 9.501 mm by finite elements, +3.52 % too soft')
     >>> result.displacements.shape, result.stiffness.shape, result.spring_forces.shape
     ((415, 2), (1143,), (1143,))
     >>> print(f"{result.stiffness.max():.4g} N/m, at most {1e-3 * result.spring_forces.max():.1f} kN in a spring")

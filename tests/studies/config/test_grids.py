@@ -83,6 +83,10 @@ class TestCombinations:
         assert study.swept == ("force",)
         assert study.axes["force"] == (1.0, 2.0, 3.0, 10.0)
 
+    def test_figures_have_a_style(self, load):
+        style = load(HEAD.replace("grids:", "style: {width: 85 mm, font_size: 8}\ngrids:")).style
+        assert style == {"width": pytest.approx(0.085), "font_size": 8}
+
     def test_forces_of_each_load_go_with_it(self, load):
         study = load(load=["traction", "bending"], force={"traction": ["1 N", "2 N"], "bending": "10 N"})
         assert {(one.load, one.force) for one in study.scenes} == {("traction", 1), ("traction", 2), ("bending", 10)}

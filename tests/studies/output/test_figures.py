@@ -77,6 +77,22 @@ def test_a_plot_returns_axes_with_something_on_them_and_leaves_settings_as_they_
     assert {panel.figure.number for panel in np.ravel(axes)} == set(plt.get_fignums())
 
 
+@pytest.mark.parametrize(("own", "shown"), [({}, 8), ({"font.size": 12}, 12), ({"axes.labelsize": 5}, 5)])
+def test_settings_of_the_user_are_respected(tree, own, shown):
+    with matplotlib.rc_context(own):
+        axes = st.plot_sensitivity(tree, **CURVE)
+    assert axes.xaxis.label.get_size() == shown
+
+
+def test_a_study_chooses_width_and_size_of_text(tree, monkeypatch):
+    for name in ("COLUMN_WIDTH", "PAGE_WIDTH", "SMALL_TEXT"):
+        monkeypatch.setattr(style, name, getattr(style, name))
+    monkeypatch.setattr(style, "SETTINGS", dict(style.SETTINGS))
+    style.choose(0.0254 * 5, 10)
+    axes = st.plot_sensitivity(tree, **CURVE)
+    assert axes.figure.get_size_inches()[0] == pytest.approx(5) and axes.xaxis.label.get_size() == 10
+
+
 # -- what they show ----------------------------------------------------------------------------------------------------
 
 

@@ -264,6 +264,7 @@ def build(
         curves=in_order(curves),
         references=in_order(references),
         outputs=tuple(name for name in made if name in config.outputs),
+        style=config.style.model_dump(exclude_none=True),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         materials=bodies.materials,
         parts=parts,

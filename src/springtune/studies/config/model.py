@@ -146,6 +146,7 @@ class Study:
     references: tuple[Reference, ...]
     mesh_files: MeshFiles  # by mesh type, beam's name and mesh size
     outputs: tuple[str, ...]
+    style: dict[str, float]  # width [m] and font size [pt] of figures, where they are given
     further_references: tuple[str, ...]
     materials: dict[str, AnyMaterial]
     parts: dict[str, Any]  # by study kind

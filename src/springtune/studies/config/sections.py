@@ -348,6 +348,16 @@ def _check_mesh_type_names(files: dict[str, Any]) -> dict[str, Any]:
     return files
 
 
+class StyleConfig(Section):
+    """Style of the figures."""
+
+    width: fields.Length | None = None
+    """Width of a figure of one column; others have more. 89 mm without."""
+
+    font_size: Annotated[float, Field(ge=4, le=24, title="a number of points from 4 to 24")] | None = None
+    """Size of the text in points. 8 without."""
+
+
 class StudyConfig(Section):
     """The keys of a study."""
 
@@ -372,6 +382,10 @@ class StudyConfig(Section):
     """Your own mesh types: one file per beam and mesh size."""
 
     outputs: list[str] = Field([])
+
+    style: StyleConfig = Field(default_factory=StyleConfig)
+    """Width of figures and size of their text."""
+
     further_references: OneOrMore[fields.FurtherReference] = []
     """References at finite strain, in addition to small strain: group `/finite_strain`, and `/block` under pressure.
     Each takes seconds. In plane strain the material must be compressible. `yeoh-plane-stress` needs a

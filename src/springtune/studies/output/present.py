@@ -24,6 +24,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     made: list[Path] = []
     figures = Path(folder) / "figures"
     with reading.open(dataset) as tree:
+        _choose_style(tree)
         for output in (outputs()[name] for name in names):
             if output.module:
                 made += _draw(output, tree, figures)
@@ -41,6 +42,15 @@ def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> No
     """Make outputs and write the record of it."""
     run(dataset, folder, *names)
     atomic.write_json(record, {"digest": digest})
+
+
+def _choose_style(tree: xr.DataTree) -> None:
+    """Draw at the width and with the size of text that the study asks for."""
+    asked = {name: tree.attrs.get(f"figure_{name}") for name in ("width", "font_size")}
+    if chosen := {name: float(value) for name, value in asked.items() if value}:
+        from . import style  # here: a job that only writes tables needs no matplotlib
+
+        style.choose(**chosen)
 
 
 def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:

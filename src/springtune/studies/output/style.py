@@ -21,6 +21,8 @@ COLUMN_WIDTH = 3.5
 PAGE_WIDTH = 7.16
 """Width of its page [inch]."""
 
+METRES_PER_INCH = 0.0254
+
 POINTS_PER_INCH = 72
 """Points in an inch, the units of a PDF page."""
 
@@ -30,7 +32,7 @@ PIXELS_PER_INCH = 300
 SMALL_TEXT = 7.0
 """Size of the smallest text of a figure [pt], which journals still take at these widths."""
 
-SETTINGS: dict[Any, object] = {
+SETTINGS: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.grid": True,
     "axes.labelsize": 8,
@@ -62,6 +64,31 @@ SETTINGS: dict[Any, object] = {
     "ytick.minor.pad": 4.5,
     "ytick.minor.size": 1.5,
 }
+
+TEXT_SIZES = ("axes.labelsize", "axes.titlesize", "figure.titlesize", "font.size", "legend.fontsize", "xtick.labelsize",
+              "ytick.labelsize")  # fmt: skip
+"""Settings that follow the size of text."""
+
+
+def choose(width: float | None = None, font_size: float | None = None) -> None:
+    """Choose the width of a column [m] and the size of text [pt] of all figures of this process."""
+    global COLUMN_WIDTH, PAGE_WIDTH, SMALL_TEXT
+    if width:
+        wide = width / METRES_PER_INCH
+        COLUMN_WIDTH, PAGE_WIDTH = wide, wide / COLUMN_WIDTH * PAGE_WIDTH
+    if font_size:
+        larger = font_size / SETTINGS["font.size"]
+        SMALL_TEXT *= larger
+        SETTINGS.update({name: larger * SETTINGS[name] for name in TEXT_SIZES})
+
+
+def settings() -> dict[Any, Any]:
+    """`SETTINGS` without those that the user's rcParams change; texts follow a size of theirs."""
+    ours, usual = matplotlib.rcParams, matplotlib.rcParamsDefault
+    kept = {name: value for name, value in SETTINGS.items() if ours[name] == usual[name]}
+    larger = 1.0 if "font.size" in kept else ours["font.size"] / SETTINGS["font.size"]
+    return kept | {name: larger * kept[name] for name in TEXT_SIZES if name in kept}
+
 
 # Okabe and Ito's colours (https://jfly.uni-koeln.de/color), which the colour-blind tell apart; dashes and markers tell
 # lines apart in grey.
@@ -98,11 +125,11 @@ def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
 
 
 def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
-    """Decorator that runs a plot function with `SETTINGS` and restores them."""
+    """Decorator that runs a plot function with `settings` and restores them."""
 
     @wraps(plot)
     def inside(*arguments: P.args, **keywords: P.kwargs) -> Drawn:
-        with matplotlib.rc_context(SETTINGS):
+        with matplotlib.rc_context(settings()):
             drawn = plot(*arguments, **keywords)
             interactive = matplotlib.is_interactive()
         matplotlib.interactive(interactive)  # a notebook's backend sets it, when pyplot is imported by a first plot

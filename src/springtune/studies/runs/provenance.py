@@ -51,6 +51,7 @@ def attributes(study: Study, package: Path = PACKAGE) -> dict[str, str]:
     if study.printed_path:
         name = study.printed_path.name
         found["references"] = f"paper_*: as printed in {PRINTED.get(name, name)}"
+    found |= {f"figure_{name}": str(value) for name, value in study.style.items()}
     return found | ({"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {})
 
 
