@@ -26,10 +26,7 @@ class Blocks(NamedTuple):
 
 
 class Chunks(NamedTuple):
-    """Matrix in chunks of rows, with blocks that couple two chunks by themselves.
-
-    A smoother has the inverse of its diagonal, and what was added to it before.
-    """
+    """Matrix in chunks of rows; blocks that couple two chunks are kept apart, and its diagonal is inverted."""
 
     starts: np.ndarray
     pointers: np.ndarray
@@ -90,11 +87,10 @@ def chunked(matrix: Blocks, dtype: Any = float) -> Chunks:
 
 
 def smoother(matrix: Blocks) -> Chunks:
-    """Return what Gauss-Seidel sweeps need, in single precision.
+    """Return what Gauss-Seidel sweeps need, in single precision; raise LinAlgError if a diagonal block is not positive.
 
-    Between chunks they are Jacobi's. With half the size of these couplings on the diagonal the preconditioner stays
-    positive definite, whatever the matrix (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864,
-    2011). Raises LinAlgError if a block on the diagonal is not positive.
+    Chunks are coupled by Jacobi's method. Half the size of these couplings is added to the diagonal, which keeps any
+    preconditioner positive definite (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864, 2011).
     """
     chunks, added = chunked(matrix, np.float32), np.zeros((len(matrix.diagonal), 2))
     sizes = 0.5 * np.abs(chunks.blocks_between.astype(float).reshape(-1, 2, 2))

@@ -46,16 +46,7 @@ class Factor(Protocol):
 
 
 class SuperLUFactor:
-    """Symmetric matrix factorized by SuperLU, see `Factor`.
-
-    Examples
-    --------
-    >>> factor = SuperLUFactor(csc_array([[1.0, 2.0], [2.0, 1.0]]))
-    >>> factor.solve(np.array([3.0, 3.0]))
-    array([1., 1.])
-    >>> factor.negative_pivots  # the eigenvalues are 3 and -1
-    1
-    """
+    """Symmetric matrix factorized by SuperLU, see `Factor`."""
 
     name = "SuperLU"
 
@@ -89,10 +80,9 @@ class SuperLUFactor:
 
 
 class Analysis:
-    """Reusable symbolic factorization of all symmetric matrices of one sparsity.
+    """Reusable symbolic factorization of all symmetric matrices of one sparsity; `spare` are unused factors.
 
     Supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22, 2008).
-    `spare` are factors that nobody needs any more.
     """
 
     def __init__(self, indices: np.ndarray, pointers: np.ndarray, order: np.ndarray | None = None) -> None:
@@ -200,15 +190,13 @@ PIN = 4.0
 class PinnedFactor:
     r"""Factorized indefinite symmetric matrix with a few unknowns pinned, made by `factorize_pinned`.
 
-    An unstable network gives way in a few long waves. Pins, springs to the ground, hold them: with stiffness s at each
-    unknown that E chooses, ``K + s E E'`` has a Cholesky factor ``L L'``, as sparse as K's. The pins are taken off
-    again (M. A. Woodbury, Inverting modified matrices, Princeton, 1950):
+    An unstable network gives way in a few long waves. With springs of stiffness s to the ground at the unknowns E,
+    ``K + s E E'`` has a sparse Cholesky factor ``L L'``; then (M. A. Woodbury, Inverting modified matrices, 1950)
 
     .. math:: K^{-1} = L^{-T} (I + G T^{-1} G^T) L^{-1}, \qquad G = L^{-1} E, \qquad T = I / s - G^T G,
 
     and K has as many negative eigenvalues as the small matrix T (E. V. Haynsworth, Linear Algebra Appl. 1:73, 1968), if
-    the signs of these are `certain`. It costs one factorization and half a solve a pin; SuperLU takes several times the
-    time and memory.
+    their signs are `certain`. A pin costs half a solve; SuperLU takes several times the time and memory.
     """
 
     name = "pinned Cholesky"
@@ -271,10 +259,9 @@ LEAF = 48
 
 
 def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return an elimination order of particles with little fill-in, every cut last.
+    """Return an elimination order of particles at `points` (n_points, 2) [m] with little fill-in, every cut last.
 
-    Parts are cut across their longer side at the median; particles beyond the cut that touch it separate the halves
-    (A. George, SIAM J. Numer. Anal. 10:345, 1973). `points` (n_points, 2) [m]; `edges` (n_edges, 2) share matrix
+    Cuts halve the longer side (A. George, SIAM J. Numer. Anal. 10:345, 1973). `edges` (n_edges, 2) share matrix
     entries.
     """
     count, joined = len(points), _joined(len(points), edges)
@@ -314,19 +301,7 @@ def _joined(count: int, edges: np.ndarray) -> csr_array:
 
 
 def narrow(count: int, edges: np.ndarray) -> np.ndarray:
-    """Return an order of particles with a small bandwidth: unchanged, or reversed Cuthill-McKee.
-
-    Only changed if that at least halves the bandwidth, the largest distance of an edge's ends.
-
-    Examples
-    --------
-    A line whose particles are numbered from both ends in turns, and one that is in order:
-
-    >>> narrow(6, np.array([[0, 2], [2, 4], [4, 5], [3, 5], [1, 3]])).tolist()
-    [1, 3, 5, 4, 2, 0]
-    >>> narrow(4, np.array([[0, 1], [1, 2], [2, 3]])).tolist()
-    [0, 1, 2, 3]
-    """
+    """Return reversed Cuthill-McKee's order if it at least halves the bandwidth, else the numbers unchanged."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
     order = reverse_cuthill_mckee(_joined(count, edges), symmetric_mode=True)
@@ -336,10 +311,7 @@ def narrow(count: int, edges: np.ndarray) -> np.ndarray:
 
 
 def spread(points: np.ndarray, count: int) -> np.ndarray:
-    """Return up to `count` particles spread over a mesh, in ascending order.
-
-    Those next to the middles of parts, which are halved across their longer side.
-    """
+    """Return up to `count` particles spread over a mesh, in ascending order."""
     parts = [np.arange(len(points))]
     while len(parts) < count and len(points) >= 2 * len(parts):
         halves = []

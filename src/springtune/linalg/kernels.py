@@ -1,8 +1,7 @@
 """Compiled loops over symmetric matrices of 2 x 2 blocks: products, Gauss-Seidel sweeps, and steps between grids.
 
-Rows are cut into chunks whose number does not depend on the threads. A chunk's loops read and write its own rows
-alone, so results are the same with any number of threads; couplings between chunks follow by themselves. Fields are
-(rows, 2); `first` and `last` are the chunks of a thread.
+A chunk of rows is written only by its own loop, and couplings between chunks follow by themselves: results are the same
+with any number of threads. Fields are (rows, 2); `first` and `last` are the chunks of a thread.
 """
 
 from collections.abc import Callable

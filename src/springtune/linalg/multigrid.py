@@ -66,18 +66,15 @@ class Level(NamedTuple):
 
 
 class Multigrid:
-    """Conjugate gradients, preconditioned by multigrid on regular grids laid over the mesh.
+    """Conjugate gradients, preconditioned by multigrid on regular grids over the mesh; used like a `factors.Factor`.
 
-    It replaces a factor, see `springtune.linalg.factors.Factor`. Node displacements are interpolated bilinearly to
-    the particles and from grid to grid, each twice as wide, so rigid motions and even strains are exact. Coarse
-    matrices are Galerkin's; a cycle takes one Gauss-Seidel sweep down and one up, in single precision, enough to
-    precondition. Time and memory are proportional to the unknowns n; a factorization's grow as n^(3/2) and n log n.
-    Method: J. Xu, The auxiliary space method and optimal multigrid preconditioning techniques for unstructured grids,
-    Computing 56:215, 1996.
+    Node displacements are interpolated bilinearly, so rigid motions and even strains are exact; coarse matrices are
+    Galerkin's. A cycle takes one Gauss-Seidel sweep down and one up, in single precision. Time and memory grow as the
+    unknowns n, a factorization's as n^(3/2) and n log n. Method: J. Xu, The auxiliary space method and optimal
+    multigrid preconditioning techniques for unstructured grids, Computing 56:215, 1996.
 
-    `matrix` has a row a point, `points` (n_points, 2) are in m, and `held` (n_points, 2) marks what cannot move.
-    `besides` (2 n_points, 2 n_points), if any, is added to it in products alone. `name` is ``"multigrid"``, or that
-    of the factor that took over.
+    `points` (n_points, 2) are in m, and `held` (n_points, 2) marks directions that cannot move. `besides` is a matrix
+    (2 n_points, 2 n_points) added in products alone. `name` is ``"multigrid"``, or that of the factor that took over.
     """
 
     def __init__(
@@ -186,12 +183,9 @@ class Multigrid:
         """Solve by conjugate gradients; `missing` (n_points, 2) is used up.
 
         The first solve adds a random residual: if it vanishes too and all stiffnesses met are positive, the matrix
-        counts as positive definite. A direction of negative stiffness never loses residual. The random part is ``A
-        M^-1`` of a random vector, with the preconditioner M: a direction of stiffness ``-l``, over that in M, has a
-        share of about ``l / n**0.5``. With `RESIDUAL` and a million unknowns ``l > 1e-4`` is overlooked in one case
-        of 10 000, ``l < 1e-8`` mostly. Trap: directions of zero stiffness without load are found only for single
-        particles here, and for parts without supports by the network. A part that turns about one particle, or hangs
-        on a spring or two, counts as solved.
+        counts as positive definite. A direction of stiffness ``-l``, over that in the preconditioner, has a share of
+        about ``l / n**0.5``. With `RESIDUAL` and a million unknowns ``l > 1e-4`` is overlooked in one case of 10 000,
+        ``l < 1e-8`` mostly. Trap: a part that turns about one particle, or hangs on a spring or two, counts as solved.
         """
         solution, size = np.zeros(missing.shape), float(np.linalg.norm(missing))
         if size == 0.0:
@@ -247,11 +241,7 @@ class Multigrid:
 
     @cached_property
     def negative_pivots(self) -> int:
-        """0 if the matrix is positive definite, else 1; only a factor that takes over counts them.
-
-        A random residual has a part of every direction, too small in one case of 10 000, see `CERTAIN`; conjugate
-        gradients cannot end without having met its stiffness.
-        """
+        """0 if the matrix is positive definite, else 1, see `CERTAIN`; only a factor that takes over counts them."""
         if not self._certain and self._direct is None:
             try:
                 self.solve(np.random.default_rng(1).standard_normal(len(self._places)), CERTAIN)

@@ -1,16 +1,12 @@
 r"""Contact without penetration, with or without Coulomb friction, and without a penalty to tune.
 
-Two polygons penetrate each other most where a corner of one lies inside the other. So no corner of any outline may
-lie behind the nearest edge of another body, in both directions. Even pressure through a plane joint is exact on any
-two meshes.
-
-Each Newton step minimises the quadratic energy of all bodies under the linearised conditions,
+No corner of an outline may lie behind the nearest edge of another body, in both directions. Even pressure through a
+plane joint is exact on any two meshes. Each Newton step minimises the bodies' quadratic energy,
 
 .. math:: \min_d \tfrac{1}{2} d^T K d - r^T d \quad \text{with} \quad g + G d \ge 0,
 
-by its dual: the contact forces minimise a dense problem over the positive quadrant, with one unknown for each corner
-that is closed or nearly so. Each body enters with its own factorized tangent. Rigid bodies and floors have no
-unknowns.
+by its dual: a dense problem for the contact forces, with one unknown for each corner that is closed or nearly so. Each
+body has its own factorized tangent; rigid bodies and floors have no unknowns.
 """
 
 from __future__ import annotations
@@ -154,10 +150,7 @@ class Body:
         return (self.reference * self.network.tangent()).tocsc()
 
     def solver(self, tangent: csc_array) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function from forces [N] to displacements [m], shape (unknowns,) or (unknowns, n).
-
-        An indefinite tangent is made definite. The solver of the last tangent is cached.
-        """
+        """Return a function from forces [N] to displacements [m]; an indefinite tangent is made definite."""
         if self._solver is not None and self._solver[0] is tangent:
             return self._solver[1]
         scale = float(np.abs(tangent.diagonal()).mean())
@@ -188,10 +181,9 @@ class Obstacle:
 class _Sides:
     """Edges and corners of an outline in its current position.
 
-    `start`, `along`, `length` and `normals` belong to the edges, with normals out of the body; `turn` is the sine of
-    the turn at the end of each edge, positive at convex corners. `meeting` (n_corners, 2, 2) are the normals of the
-    edges that meet at a corner, `outward` their mean as a unit vector; `wraps` marks corners around which the body is
-    bent.
+    Of edges: `start`, `along`, `length`, outward `normals`, and `turn`, the sine of the turn at their end, positive at
+    convex corners. Of corners: `meeting` (n_corners, 2, 2), the normals of both edges, `outward`, their mean direction,
+    and `wraps`, where the body is bent around a corner.
     """
 
     def __init__(self, body: Body | Obstacle) -> None:
@@ -240,10 +232,7 @@ class _Quadratic(NamedTuple):
 
 
 class Contact:
-    """Bodies, rigid obstacles and a floor at y = 0.
-
-    `size` is the mesh size, the unit of tolerances [m]; `friction` is Coulomb's coefficient [1].
-    """
+    """Bodies, rigid obstacles and a floor at y = 0, with the mesh `size` [m] and Coulomb's `friction` [1]."""
 
     def __init__(
         self,
@@ -264,10 +253,9 @@ class Contact:
     # -- geometry ------------------------------------------------------------------------------------------------------
 
     def find(self) -> Contacts:
-        """Return the corners near a facing edge of another body, with the nearest edge of each other body.
+        """Return the corners near a facing edge of another body, with the nearest edge of each.
 
-        Where that body's next edges turn towards the corner, they are conditions too. Where they turn away and the
-        corner is at their joint, the joint's own conditions suffice.
+        That body's next edges are conditions too where they turn towards the corner.
         """
         none = np.zeros(0, dtype=int)
         parts = [Contacts(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
@@ -410,10 +398,7 @@ class Contact:
         return None
 
     def _step(self, share: float, near: bool) -> float | None:
-        """Take one bounded Newton step and return its largest displacement [m]; None if there is no step.
-
-        `near` says that the last step was short, so that its closed contacts are a good guess.
-        """
+        """Take a bounded Newton step; return its largest displacement [m], or None. `near`: the last was short."""
         contacts = self.find()
         with np.errstate(all="ignore"):
             missing = [body.missing(share) for body in self.bodies]
@@ -446,10 +431,7 @@ class Contact:
         return longest
 
     def _solve_opening(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray]:
-        """Return steps and contact forces of the quadratic minimum under all contact conditions.
-
-        Few of many contacts close: the minimum takes the likely ones, and then adds those that it violates.
-        """
+        """Return steps and forces of the minimum: under the likely contacts first, then with violated ones."""
         tangents, missing, rows, gaps, likely = quadratic
         solves = [body.solver(tangent) for body, tangent in zip(self.bodies, tangents)]
         steps = free = [solve(part) for solve, part in zip(solves, missing)]
@@ -473,9 +455,7 @@ class Contact:
     def _solve_closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
         """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear.
 
-        Contacts that pull are opened and those that close are added, a few times over. The tangent needs to be
-        definite only on the motions that closed contacts leave free. This is a true Newton step; `_solve_opening` adds
-        resistance.
+        The tangent needs to be definite only on the motions that closed contacts leave free.
         """
         tangents, missing, rows, gaps, closed = quadratic
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
@@ -588,10 +568,8 @@ def _depth(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
 def _solve_complementarity(schur: np.ndarray, opening: np.ndarray, likely: np.ndarray) -> np.ndarray:
     """Return forces >= 0 that open the gaps ``opening + schur @ forces`` to >= 0 and act on closed contacts alone.
 
-    The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and
-    Kunisch, SIAM J. Optim. 13:865, 2002), and by non-negative least squares if that cycles. `likely` is the first
-    guess of closed contacts. Corners along a plane joint can be redundant: a small compliance lets them share a
-    force.
+    Primal-dual active set from the contacts `likely` to close (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13:865,
+    2002); non-negative least squares if it cycles. A small compliance lets redundant corners share a force.
     """
     # Corners of stiff and of soft bodies: each in units of its own compliance.
     own = np.diagonal(schur)

@@ -55,8 +55,7 @@ def next_point(
 ) -> tuple[Point | None, float]:
     """Return the next point, or None, and its increment's length [m], halved while Newton's method fails.
 
-    The sign of the load `s` [m] is the way the path begins; `direction` (unknowns,) [m] points from the point before,
-    None at rest. `length` and `shortest` are norms of the displacements of all unknowns [m].
+    `direction` (unknowns,) [m] points from the point before; None at rest, where the path begins with the sign of `s`.
     """
     displacements = problem.moved(last.load, problem.network.expand(last.u))
     try:
@@ -99,8 +98,7 @@ class Continuation(NamedTuple):
 
     - `limit`: Largest load before the path turns back with one more negative eigenvalue [m], or NaN.
     - `lost`: First load at which the path was unstable before it turns back [m], or NaN.
-    - `end`: Stable point at or beyond the target, the last below it before a limit point, or the one behind it that
-      regains the load.
+    - `end`: Stable point at or beyond the target; else the last before a limit point, or one that regains the load.
     - `inverts`: Whether a cell inverts before the path turns back or reaches the target.
     """
 
@@ -113,11 +111,10 @@ class Continuation(NamedTuple):
 def continue_path(
     problem: LoadedNetwork, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
 ) -> Continuation:
-    """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
+    """Follow a path by arc length from an equilibrium `last` to a load, or to the limit point where it turns back.
 
-    The equilibrium is at `load` with displacements `last`; `before` is one shortly before. Loads are over the
-    reference stiffness [m]. `farthest` is the increment behind a limit point, norm of all displacements [m]; 0 stops
-    there.
+    `before` is an equilibrium shortly before. `farthest` is the increment behind a limit point, norm of all
+    displacements [m]; 0 stops there. Loads are over the reference stiffness [m].
     """
     network, limit, lost = problem.network, np.nan, np.nan
     direction = network.reduce(last - before)
@@ -192,9 +189,8 @@ def follow(
 ) -> Path:
     """Follow the path from rest by arc length, through limit points, until it carries a load ``s`` [m].
 
-    Riks' method: each point is sought in the plane across the last tangent, with the exact tangent in every Newton
-    step (E. Riks, Int. J. Solids Structures 15:529, 1979). `increment` is the first and largest increment and `limit`
-    the largest displacement, norms over all unknowns [m].
+    Riks' method with the exact tangent (E. Riks, Int. J. Solids Structures 15:529, 1979). `increment` is the first and
+    largest increment and `limit` the largest displacement, norms over all unknowns [m].
     """
     network, direction = problem.network, None
     point = Point(np.zeros(network.unknowns), 0.0, 0, 0)
@@ -233,29 +229,10 @@ class Buckling(NamedTuple):
 def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
     """Find the load at which the path from rest bifurcates, or would bifurcate if it did not bend before.
 
-    The load is that of a linear buckling analysis about two equilibria shortly below the critical load of the one
-    about rest. The tangent must have a negative pivot shortly beyond it and none shortly below. On an unsymmetric
-    mesh a column bends from the first load on and stays stable; then the analysis about rest is returned.
-
-    `guess` is a load of its magnitude and sign [m]. The load is NaN, with a message, if there is none up to a hundred
-    times the guess, or if the path bends far below it, as an arch's does.
-
-    Examples
-    --------
-    A slender beam of the triangular lattice, ``E t = 2 / sqrt(3)``, clamped on the left and pressed on the right,
-    over Euler's load:
-
-    >>> from springtune.mechanics.statics import StaticProblem
-    >>> from springtune.mesh import MESH_TYPES
-    >>> mesh = MESH_TYPES["structured"](0.2, 0.02, 0.01 / 27**0.5)  # six rows
-    >>> x = mesh.points[:, 0]
-    >>> held = np.repeat((x <= x.min())[:, None], 2, axis=1)
-    >>> pushed = np.stack([(x >= x.max()) / (x >= x.max()).sum(), 0 * x], axis=1)
-    >>> problem = StaticProblem(Network(mesh, held, 0.5 * mesh.cells_per_edge), pushed)
-    >>> euler = np.pi**2 * 2 / np.sqrt(3) * 0.02**3 / 12 / (4 * 0.2**2)
-    >>> found = buckling(problem, -1e-5)
-    >>> float((found.load / -euler).round(2)), found.message
-    (1.01, '')
+    Linear buckling analysis about two equilibria shortly below the critical load; the tangent must have a negative
+    pivot shortly beyond it and none below. A column on an unsymmetric mesh bends from the first load on and stays
+    stable: it gets the analysis about rest. `guess` is a load of its magnitude and sign [m]. The load is NaN, with a
+    message, beyond a hundred times the guess, or if the path bends far below it, as an arch's does.
     """
     network, at_rest = problem.network, 0.01 * guess
     for share in (1.0, 0.1):  # a first estimate, then of its own size, whatever the guess
@@ -303,9 +280,8 @@ def smallest_share(
 ) -> float:
     """Return where on the line from one tangent (0) to another (1) the first eigenvalue vanishes.
 
-    The tangent ``K1 + x (K2 - K1)`` is first singular at one over the largest eigenvalue of ``(K1 - K2) v = mu K1
-    v``. Displacements [m] are None at rest. `mirror` is as far before the first as the second is beyond it [m]:
-    tangents then change as they do at the first.
+    One over the largest eigenvalue of ``(K1 - K2) v = mu K1 v``. Displacements [m] are None at rest; `mirror` is as far
+    before the first as the second is beyond it [m]: tangents then change as they do at the first.
     """
     here, there = network.tangent(first), network.tangent(second)
     change = here - there if mirror is None else 0.5 * (network.tangent(mirror) - there)

@@ -1,13 +1,10 @@
 """Networks in motion: masses, dampers and time steps.
 
-With loads and stiffnesses over a reference stiffness k a network moves as ``(m/k) u'' + (c/k) u' + r(u) = s p``.
-Masses enter as inertia m/k [s2] and dampers as c/k [s]; frequencies and steps stay in seconds.
+With loads and stiffnesses over a reference stiffness k a network moves as ``(m/k) u'' + (c/k) u' + r(u) = s p``. Masses
+enter as inertia m/k [s2] and dampers as c/k [s]; frequencies and steps stay in seconds.
 
-Explicit steps need no factorization; `Motion.step_limit` bounds them before the run. The status and message of a
-`Run` report failures.
-
-A run can rest on an unstable equilibrium, such as a straight column above its buckling load. So the tangent at rest
-is factorized once, and its negative pivots are counted.
+A run can rest on an unstable equilibrium, such as a straight column above its buckling load: the tangent at rest is
+factorized once, to count its negative pivots.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,8 +39,7 @@ MOST_EXTENTS = 1e3
 def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
     """Return lumped masses [kg], shape (n_points,): a cell of area A gives ``rho A t / n`` to each of its n corners.
 
-    The total is exact; the centre of mass is exact for triangles and parallelograms (equation 1 of the paper).
-    `density` is in kg/m3, `thickness` in m.
+    The centre of mass is exact for triangles and parallelograms (equation 1 of the paper).
     """
     return density * thickness * mesh.particle_areas
 
@@ -82,20 +78,16 @@ class Run(Tabled):
 class Motion(Moving):
     """Network with masses, dampers and a load.
 
-    `inertia` (n_points,) is mass over reference stiffness [s2] and `load` (n_points, 2) force over it [m].
-    `mass_damping` is alpha [1/s]. `dampers` (n_springs,) is damping along each spring over the reference stiffness
-    [s]; ``beta * network.stiffness`` is Rayleigh damping by stiffness. `reference` is the reference stiffness [N/m];
-    energies and momenta are over it where it is left out.
+    `inertia` (n_points,) [s2], `load` (n_points, 2) [m] and `dampers` (n_springs,) [s] are over the `reference`
+    stiffness [N/m], energies and momenta too where it is left out. `mass_damping` is alpha [1/s];
+    ``beta * network.stiffness`` as dampers is Rayleigh damping by stiffness.
     """
 
     # -- before a run -----------------------------------------------------------------------------------------------
 
     @cached_property
     def particle_bound(self) -> float:
-        """Return an upper bound of the highest frequency from each particle's springs [rad/s].
-
-        ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `Network.local_stiffness`.
-        """
+        """Return an upper bound of the highest frequency [rad/s], ``omega^2 <= max_i 2 sum_j k_ij / m_i``."""
         return float(np.sqrt((self.network.reduce(self.network.local_stiffness) / self.mass).max()))
 
     def step_bound(self, integrator: str) -> float:
@@ -115,9 +107,8 @@ class Motion(Moving):
     def step_limit(self, integrator: str) -> float:
         r"""Return the largest stable step about rest [s]; infinite for implicit schemes.
 
-        Without lagged damping it is :math:`2/\omega_{max}`. With it, steps h are stable while :math:`4 M - 2 h C -
-        h^2 K` has no negative eigenvalue; for one mode of damping ratio xi that is :math:`(2/\omega)(\sqrt{1 + \xi^2}
-        - \xi)`.
+        :math:`2/\omega_{max}`; with lagged damping :math:`4 M - 2 h C - h^2 K` has no negative eigenvalue, for one mode
+        of damping ratio xi :math:`h < (2/\omega)(\sqrt{1 + \xi^2} - \xi)`.
         """
         if integrator in IMPLICIT:
             return np.inf
@@ -145,11 +136,9 @@ class Motion(Moving):
 
     @cached_property
     def loaded_mode(self) -> tuple[float, np.ndarray]:
-        """Frequency [rad/s] and shape of the mode that has the largest share in the static answer to the load.
+        """Frequency [rad/s] and shape (unknowns,) of the mode with the largest share in the static answer to the load.
 
-        By Lanczos' method from the static answer, which keeps to the load's symmetry; one factorization. It ends when
-        modes that have converged leave less of the answer than the largest share. The shape (unknowns,) has an inertia
-        of 1.
+        By Lanczos' method from the static answer, which keeps to the load's symmetry. The shape has an inertia of 1.
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
@@ -217,10 +206,9 @@ class Motion(Moving):
         precision: str = "float64",
         threads: int = 1,
     ) -> Run:
-        """Take a number of steps, or step until rest.
+        """Take a number of steps [s], or step until rest, from displacements [m] and `velocities` [m/s].
 
-        `step` is in s; `start` and `velocities` have shape (n_points, 2) [m], [m/s], zero by default. `watch` gets
-        time, displacements and velocities with every sample.
+        `watch` gets time, displacements and velocities with every sample.
         """
         name = "backward-euler" if isinstance(integrator, BackwardEuler) else integrator
         if name not in INTEGRATORS:
@@ -350,10 +338,9 @@ def relax(
 ) -> Run:
     r"""Find an equilibrium by dynamic relaxation: explicit steps with fictitious masses and damping.
 
-    Masses of twice the row sums of stiffness make a step of 1 stable. The damping is critical for the current
-    frequency :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` (Underwood, Dynamic relaxation,
-    in: Computational methods for transient analysis, 1983, ch. 5). `load` (n_points, 2) is force over reference
-    stiffness [m]. One factorization judges the stability of the result.
+    Masses of twice the row sums of stiffness make a step of 1 stable. Damping is critical for the frequency
+    :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` (Underwood, Dynamic relaxation, in:
+    Computational methods for transient analysis, 1983, ch. 5). `load` (n_points, 2) is over the reference [m].
     """
     # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
     inertia = 0.3 * network.local_stiffness.max(axis=1, initial=0.0, where=~network.held)

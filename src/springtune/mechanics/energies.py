@@ -1,10 +1,8 @@
 """Energies besides springs: of areas, of angles, of squared edge lengths, and of rubber.
 
-An energy is a sum over cells. It gives its value, its forces and its exact tangent cell by cell. Changes of areas,
-angles and lengths are computed from displacements, since subtracting two states would lose digits at small strain.
-Moduli are over the network's reference stiffness.
-
-Inside, fields have shape (2, m, n_cells): numpy is several times faster on long rows than on short vectors.
+Each is a sum over cells, with forces and an exact tangent; moduli are over the network's reference stiffness. Changes
+of areas, angles and lengths come from displacements: subtracting two states would lose digits at small strain. Inside,
+fields have shape (2, m, n_cells), several times faster in numpy than short vectors.
 """
 
 from abc import ABC, abstractmethod
@@ -51,10 +49,7 @@ def area_slopes(positions: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Energy(ABC):
-    """Base of the energies; what they have besides the cells are moduli, with a row for each cell.
-
-    `points` (n_points, 2) are rest positions [m]; `corners` (n_cells, m) are each cell's particles, counter-clockwise.
-    """
+    """Base of the energies of cells, with rest `points` [m] and `corners` (n_cells, m), counter-clockwise."""
 
     points: np.ndarray
     corners: np.ndarray
@@ -82,8 +77,7 @@ class Energy(ABC):
     def couplings(self, displacements: np.ndarray | None = None) -> np.ndarray:
         """Return tangent blocks of pairs of corners of a cell [1], shape (n_pairs, 2, 2, n_cells); at rest by default.
 
-        Axes: pair in the order of `Mesh.cell_edges`, direction at its first corner, direction at its second. They
-        define the whole tangent, since a common displacement changes no energy.
+        Axes: pair as `Mesh.cell_edges`, direction at its first corner, at its second. They define the whole tangent.
         """
         moved = np.zeros(self._rest.shape) if displacements is None else self._at_corners(displacements)
         return self._couplings(moved)
@@ -175,11 +169,9 @@ class AreaEnergy(Energy):
 
 @dataclass(frozen=True)
 class AngleEnergy(Energy):
-    r"""Energy of the angles of each triangle; `modulus` is beta over the reference stiffness [m2].
+    r"""Energy of the angles of triangles; `modulus`, (n_cells,) or (n_cells, 3), is over the reference [m2].
 
     .. math:: W = \tfrac{1}{2} \sum_i \beta_i (\theta_i - \theta_{i,0})^2
-
-    It is one number a triangle (n_cells,), or one for each of its corners (n_cells, 3).
     """
 
     modulus: np.ndarray
@@ -243,14 +235,11 @@ class AngleEnergy(Energy):
 
 @dataclass(frozen=True)
 class BiquadraticEnergy(Energy):
-    r"""Energy of the squared lengths of each triangle's sides, coupled or not.
-
-    With :math:`q_i = l_i^2 - L_i^2` of the side opposite corner i,
+    r"""Energy of the squared lengths of each triangle's sides, :math:`q_i = l_i^2 - L_i^2` opposite corner i.
 
     .. math:: W = \sum_i \tfrac{k_i}{4} q_i^2 + \sum_{i<j} \tfrac{\gamma_{ij}}{2} q_i q_j
 
-    `tensile` is k_i and `coupling` the gamma of the two sides that meet in each corner: both (n_cells, 3), over the
-    reference stiffness [1/m2].
+    `tensile` k and `coupling` gamma, of sides that meet in a corner, are (n_cells, 3), over the reference [1/m2].
     """
 
     tensile: np.ndarray
@@ -308,15 +297,12 @@ class BiquadraticEnergy(Energy):
 
 @dataclass(frozen=True)
 class _SheetEnergy(Energy):
-    r"""Base of isotropic rubber laws: energies of the trace of C and of the area ratio J of a triangle.
+    """Base of isotropic rubber laws: functions of the area ratio J of a triangle and of D.
 
-    ``tr C A_0`` is half the sum over the sides of the opposite angle's cotangent times the squared length. A law is a
-    function of J and of
+    .. math:: D = tr C - 2 J = (F_{11} - F_{22})^2 + (F_{12} + F_{21})^2
 
-    .. math:: D = tr C - 2 J = (F_{11} - F_{22})^2 + (F_{12} + F_{21})^2,
-
-    the squared difference of the principal stretches. Both terms are linear in the displacements, so nothing cancels
-    near rest. Flat or inverted triangles have no finite energy.
+    Both terms are linear in the displacements, so nothing cancels near rest. ``tr C A_0`` is half the sum over the
+    sides of the opposite angle's cotangent times the squared length. Flat or inverted triangles have no finite energy.
     """
 
     @abstractmethod
@@ -377,13 +363,12 @@ def _dilation(growth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class YeohEnergy(_SheetEnergy):
-    r"""Energy of an incompressible sheet in plane stress, a polynomial of the first invariant in three dimensions.
+    r"""Energy of an incompressible sheet in plane stress (O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990).
 
     .. math:: W = A_0 \sum_{n \ge 1} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2}
 
-    O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990; one term alone is neo-Hookean, ``c_1 = mu t / 2``. `coefficients`
-    (n_cells, n) are times the thickness over the reference stiffness [1], the linear one first. `largest` is the
-    largest I_1 - 3 of the fitted test; the law extrapolates beyond it.
+    One term alone is neo-Hookean, ``c_1 = mu t / 2``. `coefficients` (n_cells, n) are times the thickness over the
+    reference stiffness [1]; beyond `largest`, I_1 - 3 of the fitted test, the law extrapolates.
     """
 
     coefficients: np.ndarray
@@ -424,9 +409,8 @@ class StableNeoHookeEnergy(_SheetEnergy):
 
     .. math:: W = A_0 \left[ \tfrac{\mu}{2} (tr C - 2 J) + \tfrac{\lambda + \mu}{2} (J - 1)^2 \right]
 
-    It is ``mu/2 (tr C - 2) + (lambda + mu)/2 (J - 1 - mu / (lambda + mu))^2`` but for a constant, the law of Smith, de
-    Goes and Kim (Stable neo-Hookean flesh simulation, ACM TOG 37(2), 2018) in the plane. Both constants are over the
-    reference stiffness, times the thickness. No sheet of rubber has this law: its thickness plays no part.
+    But for a constant the law of Smith, de Goes and Kim (Stable neo-Hookean flesh simulation, ACM TOG 37(2), 2018) in
+    the plane. No sheet of rubber has this law: thickness plays no part. Constants are times it over the reference.
     """
 
     shear: np.ndarray
@@ -451,14 +435,10 @@ class NeoHookeEnergy(_SheetEnergy):
     .. math:: W = A_0 \min_z \left[ \tfrac{\mu}{2} (J_3^{-2/3} (tr C + z^2) - 3) + \tfrac{K}{2} (J_3 - 1)^2 \right],
         \quad J_3 = z J
 
-    A scalar Newton's method finds the stretch z across the sheet in each cell. With ``v = ln J_3`` and ``y = ln J - 2
-    v / 3`` the bracket is
-
-    .. math:: \tfrac{\mu}{2} (e^{y} / J \, D + 2 e^y + e^{-2 y} - 3) + \tfrac{K}{2} (e^v - 1)^2.
-
-    Under this law a sheet pressed to less than half of its volume collapses across its thickness: it has no energy
-    there, nor when inverted. For infinite K use `YeohEnergy`. `shear` and `bulk` (n_cells,) are mu and K at small
-    strain times the thickness over the reference stiffness [1].
+    Newton's method finds the stretch z across the sheet. With ``v = ln J_3`` and ``y = ln J - 2 v / 3`` the bracket is
+    :math:`\tfrac{\mu}{2} (e^{y} / J \, D + 2 e^y + e^{-2 y} - 3) + \tfrac{K}{2} (e^v - 1)^2`. A sheet pressed to less
+    than half of its volume collapses across its thickness and has no energy. `shear` and `bulk` (n_cells,) are mu and K
+    at small strain times the thickness over the reference stiffness [1]; for infinite K use `YeohEnergy`.
     """
 
     shear: np.ndarray

@@ -24,10 +24,9 @@ STEP_TOLERANCE = 1e-3
 class Expansion:
     """Power series of the equilibrium path about one of its points.
 
-    Displacements, loads, a spring's vector d, its length l and ``w = 1/l`` are power series of ``sigma``. From ``l^2
-    = d.d``, ``w l = 1`` and the force ``k (d - L w d)``, order n follows from lower orders by one solve with the
-    tangent. The parameter is the growth of the load; or, where the load may turn, the way along the path ``sigma = (u
-    - u_0).v / v.v`` with the first derivative v, as the first order of the load is 1 either way.
+    Displacements, loads, a spring's vector d, its length l and ``w = 1/l`` are power series of ``sigma``: the growth of
+    the load or, where the load may turn, the way along the path. From ``l^2 = d.d``, ``w l = 1`` and the force
+    ``k (d - L w d)``, order n follows from lower orders by one solve with the tangent.
 
     `load` (unknowns,) is the pattern [1]; `s` [m] and `displacements` (None at rest) are the point. Displacements are
     ``sum_n coefficients[n] sigma^n``, shape (order + 1, n_points, 2), and loads ``sum_n loads[n] sigma^n`` [m].
@@ -118,10 +117,7 @@ class Expansion:
         return float((sizes[1] / sizes[-1]) ** (1.0 / (self.order - 1))) if sizes[-1] else 1.0
 
     def _denominator(self, lower: int) -> np.ndarray:
-        """Return the denominator whose product with the series has the smallest orders beyond the numerator's.
-
-        In powers of the parameter over the radius.
-        """
+        """Return the denominator, over the radius, whose product with the series is smallest beyond the numerator."""
         if lower not in self._denominators:
             powers = self._radius ** np.arange(self.order + 1.0)
             scaled = self._products * np.outer(powers, powers)
@@ -135,10 +131,9 @@ class Expansion:
         return self._denominators[lower]
 
     def _shares(self, sigma: float, less: int = 0) -> np.ndarray:
-        """Return the factors of the coefficients in their approximant with one denominator, shape (order + 1,).
+        """Return the factors (order + 1,) of the coefficients in their approximant with one denominator.
 
-        The denominator has half the order, or a degree `less`. The numerator has the rest far beyond the radius, and
-        all orders where the path may turn within it.
+        It has half the order, or a degree `less`; the numerator the rest, or all orders within a turn's radius.
         """
         lower = self.order // 2 - less
         upper = self.order if self.turning else self.order - lower
@@ -195,10 +190,7 @@ class Expansion:
         return float(best), error if np.isfinite(error) else np.inf
 
     def measure(self, weights: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the weighted displacement at each ``s`` [m] by Pade approximants, and its error estimate.
-
-        The error is the largest relative difference to the approximants of the two lower orders.
-        """
+        """Return the weighted displacement at each ``s`` [m] by Pade approximants, and an error estimate."""
         series = np.tensordot(self.coefficients, weights, axes=2)
         sigma = np.asarray(s) - self.s
         # Scaled so that all coefficients are of one size: the equations of an approximant are then well-conditioned.

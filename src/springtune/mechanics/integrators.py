@@ -26,11 +26,7 @@ BEHAVIOURS = ("stable", "decaying", "growing", "nan")
 
 @dataclass(frozen=True)
 class BackwardEuler:
-    """Options of the scheme ``backward-euler``, in place of its name.
-
-    `iterations` are conjugate-gradient iterations a step, or None to
-    factorize; `tolerance` is their relative residual, by default SOFA's.
-    """
+    """Scheme ``backward-euler`` with conjugate-gradient `iterations` a step (None factorizes) and their `tolerance`."""
 
     iterations: int | None = None
     tolerance: float = 1e-5

@@ -1,16 +1,12 @@
 r"""Compiled inner loops of explicit time steps.
 
-Displacements u and velocities v advance by many steps of
-
 .. math:: v \leftarrow d \, v + g \, (p - r(u) - c(v)), \qquad u \leftarrow u + h \, v
 
-with the step over the mass in g, 0 for held directions, so that nothing is allocated or branched on. In single
-precision all arrays and numbers are single.
+with the step over the mass in g, 0 for held directions. In single precision all arrays and numbers are single.
 
-Particles advance in blocks, a block by several steps (a pass) before distant ones, so that its numbers stay in a
-core's cache; steps follow each other at the distance of the bandwidth. Several threads take passes in turns
-(pipelined temporal blocking, Wittmann, Hager and Wellein, 10.1109/IPDPSW.2010.5470813). The results and the order of
-summation do not depend on threads or block size.
+Particles advance in blocks, a block by several steps (a pass) before distant ones, so that its numbers stay in a core's
+cache; several threads take passes in turns (pipelined temporal blocking, Wittmann, Hager and Wellein,
+10.1109/IPDPSW.2010.5470813). Results and the order of summation do not depend on threads or block size.
 """
 
 from collections.abc import Iterator
@@ -138,14 +134,9 @@ def advance_springs(
 ) -> None:
     """Advance springs with their length law and a damper each, in the passes of a thread.
 
-    A particle is done after the springs to smaller numbers and then its own. A block takes three loops; the second is
-    vectorised.
-
-    `first`, `second` (n_springs,) are ends in ascending order; `rest` (2, n_springs) vectors [m]; `lengths` [m],
-    `stiffness` [1] and `dampers` [s] (n_springs,) over the reference stiffness, or no dampers (length 0). `gain`,
-    `load`, `force` (n_points, 2) are g [1/s] and loads [m]; `force` holds loads at start and end. `keep` is d [1],
-    `step` in s. `room` (4, most springs of a block) is a thread's scratch space; `u`, `v` (1, n_points, 2) the state
-    [m, m/s].
+    Shapes: `first`, `second`, `lengths`, `stiffness`, `dampers` (n_springs,), ends in ascending order, `dampers`
+    perhaps empty; `rest` (2, n_springs); `gain` g, `load`, `force` at start and end (n_points, 2); `room` (4, most
+    springs of a block) is scratch space; `u`, `v` (1, n_points, 2) the state [m, m/s]. `keep` is d [1].
     """
     u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
     ax, ay, bx, by = room[0], room[1], room[2], room[3]
@@ -211,8 +202,7 @@ def advance_matrix(
 ) -> None:
     """Advance a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
 
-    `stiffness` [1] and `dampers` [s] are entries, shape (n_entries,), or no dampers (length 0); `gain`, `load`
-    (unknowns,). `u` (2, unknowns) and `v` (1 or 2, unknowns) alternate between two states; v needs two with dampers.
+    `u` (2, unknowns) and `v` (1, with dampers 2, unknowns) alternate between two states; `dampers` may be empty.
     """
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
     blocks, distance = _passes(count, size, depth, bandwidth)

@@ -62,10 +62,9 @@ def work_of(fields: list[np.ndarray], forces: list[np.ndarray], mesh: Mesh) -> n
 
 
 def strip_fault(mesh: Mesh) -> str:
-    """Return why a patch test between rollers is not possible on a mesh, with the remedy, or an empty string.
+    """Return why a mesh is no strip for a patch test between rollers, with the remedy, or an empty string.
 
-    The mesh must be a strip without holes: straight lower and upper faces, and one length at every height. Staggered
-    ends are fine.
+    A strip has straight lower and upper faces, one length at every height and no holes; staggered ends are fine.
     """
     outline = mesh.edges[mesh.on_outline]
     x, y = mesh.points.T
@@ -91,10 +90,7 @@ def strip_fault(mesh: Mesh) -> str:
 
 
 def free_body(mesh: Mesh) -> np.ndarray:
-    """Return directions to hold, shape (n_points, 2), so that a body is free but cannot move as a whole.
-
-    Three directions are held, at two distant particles.
-    """
+    """Return three directions to hold, shape (n_points, 2), so that a body is free but cannot move as a whole."""
     parts = connected(mesh.edges, len(mesh.points)).max() + 1
     if parts > 1:
         raise MeshError(f"the mesh has {parts} parts that no edge joins, and a free body is one; join them")
@@ -121,23 +117,7 @@ def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
 
 
 class PatchTest:
-    """Patch tests of many networks on one mesh, which share its sparsity.
-
-    Examples
-    --------
-    Triangular lattice, each spring the mean of two triangles: nu = 1/3 and ``G / E`` = 3/8.
-
-    >>> from types import SimpleNamespace
-    >>> from springtune.mesh import lattice
-    >>> mesh = lattice(12, 8)
-    >>> test = PatchTest(mesh)
-    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
-    >>> young_modulus, poisson_ratio = test.axial(springs)
-    >>> float((young_modulus * 3**0.5 / 2).round(6)), float(poisson_ratio.round(6))
-    (1.0, 0.333333)
-    >>> round(test.shear(springs) / float(young_modulus), 6)
-    0.375
-    """
+    """Patch tests of many networks on one mesh, which share its sparsity."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -178,11 +158,10 @@ class PatchTest:
         return held, self.mesh.points[:, ::-1] * [1.0, 0.0]
 
     def stiffness(self, springs: Elastic) -> np.ndarray:
-        """Return the plane-stress stiffness under affine displacements of the outline and the rims of holes.
+        """Return the plane-stress stiffness (3, 3) under affine displacements of the outline and of holes' rims.
 
-        Shape (3, 3), times the thickness over the reference stiffness [1]; Voigt: xx, yy, shear angle xy. A continuum
-        has the same even strain inside, so the test is exact on any mesh. No test of the same mesh is stiffer (Hill's
-        bounds).
+        In Voigt's order, times the thickness over the reference stiffness [1]. Exact on any mesh, the stiffest test
+        (Hill).
         """
         held = self._frame[0]
         network = self._network("frame", held, springs)
@@ -192,11 +171,7 @@ class PatchTest:
         )
 
     def axial(self, springs: Elastic) -> tuple[float, float]:
-        """Return E t over the reference stiffness and nu [1]: along x between rollers for a strip.
-
-        Other meshes, see `strip_fault`, have no axis: their moduli are means over all directions of `stiffness`, see
-        `isotropic_moduli`.
-        """
+        """Return E t over the reference stiffness and nu [1]: along x for a strip, else means over all directions."""
         if self.strip_fault:
             if springs.lateral:
                 raise MeshError(f"no patch test of springs that go with a lateral stress: {self.strip_fault}")
@@ -246,8 +221,7 @@ def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
 def isotropic_moduli(compliance: np.ndarray) -> tuple[float, float]:
     """Return Young's modulus and Poisson's ratio [1] of a compliance (3, 3, Voigt), as means over all directions.
 
-    1/E is the mean strain along a unit pull, nu/E the mean shortening across it. They are exact for an isotropic
-    compliance and do not change under rotation.
+    1/E is the mean strain along a unit pull, nu/E the mean shortening across it.
     """
     (xx, xy, _), (_, yy, _), (_, _, shear) = compliance
     along, across = (3 * (xx + yy) + 2 * xy + shear) / 8, (xx + yy + 6 * xy - shear) / 8

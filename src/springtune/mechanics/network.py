@@ -1,14 +1,11 @@
 """Particles and springs: forces, tangent and factorized tangent of a network.
 
-A spring of stiffness k_e and rest length L_e, with distance vector d and length l, pulls with ``k_e (l - L_e) d /
-l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
+A spring of stiffness k_e and rest length L_e, with distance vector d and length l, pulls with ``k_e (l - L_e) d / l``.
+Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
 
-Scaling: a network has relative stiffnesses, each spring's over one reference stiffness k [N/m]. Forces are computed
-over k, so their unit is m, and energies over k in m2 (names end in ``_over_k``); ``s = F / k`` is the load. One
-solution in s serves all forces and reference stiffnesses of equal F/k. Multiply a force or an energy by k to have it
-in N or J.
-
-A network may have energies besides its springs, see `springtune.mechanics.energies`.
+Scaling: each spring's stiffness is over one reference stiffness k [N/m], so forces are in m and energies in m2 (names
+end in ``_over_k``), and ``s = F / k`` is the load. One solution in s serves all forces and reference stiffnesses of
+equal F/k.
 """
 
 import copy
@@ -58,10 +55,9 @@ SMALL_PIVOT = 1e-8
 
 
 class FollowerPressure:
-    """Pressure that turns and grows with its edges.
+    """Pressure that turns and grows with its edges (n, 2), which have the body to their left.
 
-    Each edge of vector e carries ``e`` turned left by a right angle times its pressure, half on either end. `edges`
-    (n, 2) have the body to their left; `pressure`, one or (n,), is force over length towards the body [1/m].
+    Half of ``e`` turned left by a right angle, times `pressure`, one or (n,) [1/m], acts on either end.
     """
 
     def __init__(self, mesh: Mesh, edges: np.ndarray, pressure: float | np.ndarray) -> None:
@@ -188,10 +184,7 @@ class Network:
         return total
 
     def _spring_vectors(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return each spring's vector [m], its length [m] and the growth of its squared length [m2].
-
-        Elongations are ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose digits at small strain.
-        """
+        """Return each spring's vector [m], length [m] and growth of the squared length [m2], without cancellation."""
         relative = self.end_differences(displacements)
         vectors = self.rest_vectors + relative
         squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
@@ -213,10 +206,7 @@ class Network:
         return self.stiffness * squares / (lengths + self.rest_lengths)
 
     def rounding(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
-        """Return the size of the rounding errors in the resistance [m], shape (unknowns,).
-
-        The two end forces of a spring are exactly opposite, so only the sums at each particle round.
-        """
+        """Return the size of the rounding errors in the resistance [m], (unknowns,): only sums at particles round."""
         total = np.zeros(self.held.shape)
         if linear:
             normals = self.rest_vectors / self.rest_lengths[:, None]
@@ -261,9 +251,9 @@ class Network:
     def tangent(
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> csc_array:
-        """Return the derivative of the resistance [1], (unknowns, unknowns); symmetric except for a follower's part.
+        """Return the derivative of the resistance [1], (unknowns, unknowns), at rest by default.
 
-        It is taken at `displacements` [m], or at rest.
+        It is symmetric except for a follower's part.
         """
         data = self._pattern.coupling_entries(self._couplings(displacements))
         if follower is not None:
@@ -306,8 +296,7 @@ class Network:
     def local_stiffness(self) -> np.ndarray:
         """Return the sums of stiffness about each particle over the reference stiffness, shape (n_points, 2).
 
-        By Gershgorin's theorem the largest, over its mass, bounds the eigenvalues of stiffness over mass: in blocks
-        of particles for springs, in rows of the rest tangent with other energies.
+        The largest, over its mass, bounds the eigenvalues of stiffness over mass (Gershgorin's theorem).
         """
         if self.energies:
             return self.expand(np.asarray(abs(self.tangent()).sum(axis=1)).ravel())
@@ -344,8 +333,7 @@ class Network:
     def _mechanism(self, slack: np.ndarray) -> str:
         """Say where slack springs let a part move without resistance, or return an empty string.
 
-        Rounding decides the sign of such a motion's stiffness. It is a mechanism if a little stiffness more in every
-        spring makes the network stable, and a little less unstable.
+        It is a mechanism if slightly stiffer springs make the network stable and slightly softer ones unstable.
         """
         if not slack.any():
             return ""
@@ -393,11 +381,7 @@ class Network:
         return SuperLUFactor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
 
     def _cholesky(self, matrix: csc_array) -> Factor | None:
-        """Return Cholesky's factor, with pins if needed; None if pins do not help.
-
-        If the last matrix was indefinite, pins are tried first. A matrix that is positive definite still gets its
-        plain factor.
-        """
+        """Return Cholesky's factor, with pins if needed; None if they do not help."""
         tried = self._indefinite
         if tried and (pinned := self._factorize_pinned(matrix)):
             return pinned

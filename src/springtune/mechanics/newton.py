@@ -51,8 +51,7 @@ class Equilibrium:
     - `residual`: Norm of the out-of-balance force over that of the load [1].
     - `factor`: Factorized tangent; at the solution if it converged.
     - `error_estimate`: Estimated relative error of the displacements [1], or NaN.
-    - `unstable_share`, `limit_share`: Shares of the load at which the path is unstable, and at which it turns back
-      [1], or NaN.
+    - `unstable_share`, `limit_share`: Shares of the load where the path is unstable and turns back, or NaN.
     - `load_share`: Largest share of the load with a good equilibrium [1]; 1 if it converged.
     - `last` (n_points, 2), or None: Displacements at that share, if below 1.
     - `snapped`: Whether the path regains the load in a stable equilibrium behind the limit point.
@@ -73,11 +72,7 @@ class Equilibrium:
 
 
 class Iterate(NamedTuple):
-    """Iterate of Newton's method.
-
-    `displacements` (n_points, 2) [m], `missing` load less resistance (unknowns,) [m], and `residual`, its norm over
-    the load's [1].
-    """
+    """Iterate: displacements (n_points, 2) [m], `missing` load (unknowns,) [m], and its norm over the load's."""
 
     displacements: np.ndarray
     missing: np.ndarray
@@ -140,10 +135,10 @@ class LoadedNetwork:
     def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
         """Return the eigenvalues nearest to zero of the tangent over the masses, under a follower pressure.
 
-        This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real
-        axis (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform
-        sheet, without damping, which can lower the critical load. The complex values are squared frequencies over
-        stiffness and mass of the whole sheet; at most `MOST_MODES`.
+        This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real axis
+        (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform sheet;
+        damping, left out, can lower the critical load. At most `MOST_MODES` squared frequencies over stiffness and mass
+        of the whole sheet.
         """
         network = self.network
         mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
@@ -203,12 +198,11 @@ class LoadedNetwork:
 
 
 class Newton:
-    """Newton's method with the exact tangent, under one load ``s`` [m].
+    """Newton's method with the exact tangent, under one load ``s`` [m]; no step inverts a cell.
 
-    A few steps may leave the residual above its minimum. Then the best iterate is restored and steps are halved until
-    the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell, Math. Programming Study
-    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by
-    `KEPT_TANGENT_FACTOR`: a new one costs ten such steps.
+    If the residual stays above its minimum, the best iterate is restored and steps are halved (watchdog technique:
+    Chamberlain, Lemarechal, Pedersen and Powell, Math. Programming Study 16:1, 1982). A factor is reused while its
+    steps cut the residual by `KEPT_TANGENT_FACTOR`: a new one costs ten such steps.
     """
 
     def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int) -> None:
@@ -216,10 +210,7 @@ class Newton:
         self.max_factorizations = max_factorizations
 
     def solve(self, start: np.ndarray) -> Equilibrium:
-        """Return the equilibrium from displacements [m], shape (n_points, 2), that contain the prescribed ones.
-
-        It starts from rest if forces there are not finite or cells are inverted.
-        """
+        """Return the equilibrium from displacements [m] that contain the prescribed ones; from rest if invalid."""
         here = self._iterate_at(start)
         if not np.isfinite(here.residual) or self.network.inverted(start):
             rest = np.zeros_like(start)

@@ -20,11 +20,10 @@ PIN_COUNTS = (8, 32)
 
 
 class Pattern:
-    """Sparsity that matrices of networks with one mesh and one set of held directions share.
+    """Sparsity of the matrices of all networks with one mesh and one set of held directions: springs define it.
 
-    All particles of a cell are joined by springs, so springs define all entries. `number` (n_points, 2) is the
-    unknown of each direction, -1 where held; `indices` and `pointers` (int32) are rows, ascending, and column
-    pointers.
+    `number` (n_points, 2) is the unknown of each direction, -1 where held; `indices` and `pointers` (int32) are rows,
+    ascending, and column pointers.
     """
 
     def __init__(self, mesh: Mesh, held: np.ndarray) -> None:
@@ -49,11 +48,7 @@ class Pattern:
 
     @cached_property
     def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return rows, column pointers, and each entry's place in what `coupling_entries` assembles.
-
-        Springs are sorted, so the blocks above a column's diagonal, its own and those below are in order within a
-        column.
-        """
+        """Return rows, column pointers, and each entry's place in what `coupling_entries` assembles."""
         count, joined = self.shape[0], len(self.springs)
         # Particles that are held in both directions have no blocks.
         free = self.number.max(axis=1) >= 0
@@ -187,7 +182,7 @@ class Pattern:
     def coupling_entries(self, couplings: np.ndarray) -> np.ndarray:
         """Return the tangent's entries from blocks (2, 2, n_springs) that couple the ends of each spring.
 
-        A common displacement costs nothing, so a particle's own block is minus the sum of its springs' blocks.
+        A common displacement costs nothing: a particle's own block is minus the sum of its springs' blocks.
         """
         own = self._own(couplings)
         return np.concatenate([couplings.ravel(), *own[[0, 1, 1, 2]]])[self._sparsity[2]]

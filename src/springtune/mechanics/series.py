@@ -1,8 +1,4 @@
-"""Sensitivity curves from one equilibrium path: the displacement under many loads at once.
-
-With ``s = F / k`` every stiffness k lies on one path from rest. It is followed by power series of the load, or of the
-arc along it, see `springtune.mechanics.expansion`.
-"""
+"""Sensitivity curves: the displacement under many loads ``s = F / k`` from one equilibrium path, by power series."""
 
 from dataclasses import dataclass
 
@@ -50,10 +46,9 @@ PATH_DISTANCE = 0.02
 
 
 def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weighted displacement at many loads on one equilibrium path, and where it is stable.
+    """Return the weighted displacement at many loads on one path from rest, or NaN, and where it is stable up to there.
 
-    `weights` has shape (n_points, 2); `targets` (n,) is force over reference stiffness, all of one sign [m]. Values are
-    NaN where the path from rest reaches no equilibrium. A load is stable if the path is stable up to there.
+    `weights` (n_points, 2); `targets` (n,) are forces over reference stiffness, all of one sign [m].
     """
     path = StablePath(problem, weights, targets)
     return path.values, path.stable
@@ -72,16 +67,13 @@ class _Point:
 
 
 class StablePath:
-    """Stable part of an equilibrium path from rest, as far as the loads need it.
+    """Stable part of an equilibrium path from rest, as far as the loads of `trace` need it.
 
-    It begins with the series about rest. Where that fails, as for a beam of an unsymmetric mesh next to buckling, the
-    path is followed in steps: a series predicts a point and a solve corrects it.
+    It begins with the series about rest. Where that fails, as for a beam of an unsymmetric mesh next to buckling, a
+    series predicts a point and a solve corrects it. Between two stable points of one series the path counts as stable
+    if no spring's length changes by more than `CHECKED_STRETCH`. Stability that was lost is not regained.
 
-    Between two stable points of one series the path counts as stable if no spring's length changes by more than
-    `CHECKED_STRETCH`: the lowest eigenvalue would have to pass zero twice. Stability that was lost is not regained.
-
-    Arguments, `values` and `stable` are those of `trace`. `stable_to` is the largest load, without its sign, known to
-    be carried [m]; `end` says why the path ends before the last target.
+    `stable_to` is the largest load, without its sign, known to be carried [m]; `end` is why the path ends early.
     """
 
     def __init__(self, problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> None:
@@ -245,10 +237,7 @@ class StablePath:
         return least
 
     def _check_between(self, loads: np.ndarray, values: np.ndarray, stable: np.ndarray) -> None:
-        """Correct values that differ from their neighbours' trend: an approximant may have a pole next to a zero.
-
-        A tangent factorized near by is accurate enough to see it.
-        """
+        """Correct values off their neighbours' trend: an approximant may have a pole next to a zero."""
         count = int(stable.sum())
         doubtful = np.abs(trend_deviation(loads[:count], values[:count])) > CURVE_TOLERANCE * np.abs(values[:count])
         for place in np.flatnonzero(doubtful):
@@ -403,10 +392,7 @@ class LinearPath:
 
 
 def trend_deviation(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return how far values differ from the polynomials through three neighbours on either side; 0 without enough.
-
-    `x`, `y` have shape (n,); `x` is sorted either way.
-    """
+    """Return the distance of `y` (n,) from polynomials in sorted `x` through three neighbours on either side, or 0."""
     result = np.zeros(len(x))
     if len(x) < 7:
         return result

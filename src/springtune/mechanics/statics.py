@@ -1,9 +1,8 @@
 """Equilibria of a network under a growing load: linear, nonlinear, and along the whole path.
 
-The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is force over reference stiffness [m]. So
-one path over ``s`` serves every force, material and uniform stiffness of a mesh. Prescribed displacements are ``s``
-times their own pattern. With a pattern of forces in N, ``s = 1 / k`` and displacements times k, forces and
-displacements grow together.
+The load is ``s`` times a fixed pattern of forces of total 1, and prescribed displacements ``s`` times theirs;
+``s = F / k`` is force over reference stiffness [m]. So one path serves every force, material and uniform stiffness of a
+mesh. With a pattern in N, ``s = 1 / k``: displacements times k.
 """
 
 from collections.abc import Callable
@@ -61,22 +60,7 @@ class StaticProblem(LoadedNetwork):
 
     `pattern` (n_points, 2) are forces [1], scaled by ``s``; `dead` is its part that does not follow the deformation.
     `given` (n_points, 2) are prescribed displacements of held directions over ``s`` [1]. `load` (unknowns,) is the
-    pattern on free directions, and `load_norm` the norm that residuals are over; it includes the reactions of the
-    linear network to prescribed displacements.
-
-    Examples
-    --------
-    A spring of length 1 and stiffness 1 between a clamp and a roller, pulled by a force of a tenth of the stiffness:
-
-    >>> from springtune.mechanics.network import Network
-    >>> from springtune.mesh.cells import Mesh
-    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [False, True], [True, True]])
-    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
-    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]))
-    >>> found = problem.nonlinear(0.1)
-    >>> found.displacements[1].round(12), found.converged, problem.stability(0.1, found.displacements, found.factor)
-    (array([0.1, 0. ]), True, (0, False))
+    pattern on free directions, and `load_norm` the norm that residuals are over, with the reactions to `given`.
     """
 
     @cached_property
@@ -129,11 +113,11 @@ class StaticProblem(LoadedNetwork):
         return Status.SOLVED, "; ".join(filter(None, objections)), pivots
 
     def nonlinear(self, s: float) -> Equilibrium:
-        """Return the equilibrium with the springs' full length law.
+        """Return the equilibrium with the springs' full length law, on the path from rest.
 
-        Newton's method starts from the series about rest; if it fails, from the linear solution; then in load steps
-        from rest. Load steps also replace solutions with springs stretched beyond `FAR_STRETCH` or turned beyond
-        `FAR_CHANGE`, or with an unstable point half-way from rest: the solution must lie on the path from rest.
+        Newton's method starts from the series about rest; if it fails, from the linear solution; then in load steps.
+        Load steps also replace solutions with springs stretched beyond `FAR_STRETCH` or turned beyond `FAR_CHANGE`, or
+        with an unstable point half-way from rest.
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
@@ -177,9 +161,7 @@ class StaticProblem(LoadedNetwork):
     ) -> bool:
         """Return whether the way from one equilibrium to the next is stable in its middle, without a snap.
 
-        The straight way shortens springs that turn. So its middle is moved towards the parabola through a guess,
-        extended from `here`; if that is far off, the straight way is used. If the guess was good and the middle
-        nearly in balance, nothing has snapped.
+        The middle is on the parabola through `guess`, extended from `here`, or on the straight way if that is far off.
         """
         network = self.network
         middle, off, way = 0.5 * (here + there), there - guess, there - here

@@ -4,14 +4,12 @@ A cell of area A in which forces f act on corners at x has the mean stress (viri
 
 .. math:: \sigma = \frac{1}{A t} \sum_{corners} x \otimes f
 
-Energies give each cell's forces exactly: with `springtune.springs.delingette` this is the stress of linear triangles.
-A spring of force f, length l and direction n gives half, :math:`f l\, n \otimes n / 2`, to the cell on each side; an
-outline edge or a diagonal gives all to its one cell. Where two materials meet, the stress of springs is a mean of
-both sides in the cells next to the joint.
+Energies give each cell's forces exactly. A spring of force f, length l and direction n gives half,
+:math:`f l\, n \otimes n / 2`, to the cell on each side; an outline edge or a diagonal gives all to its one cell. In
+cells next to a joint of materials it is a mean of both sides.
 
-Stress at particles is a linear field fitted by least squares to the surrounding cells at their middles
-(superconvergent patch recovery: O. C. Zienkiewicz and J. Z. Zhu, Int. J. Numer. Methods Eng. 33:1331, 1992). Outline
-particles have too few cells: they take the mean of their inner neighbours' fits.
+Stress at particles is a linear field fitted to the surrounding cells (superconvergent patch recovery: O. C. Zienkiewicz
+and J. Z. Zhu, Int. J. Numer. Methods Eng. 33:1331, 1992); outline particles take their inner neighbours' mean.
 """
 
 from collections.abc import Mapping
@@ -23,10 +21,7 @@ from .network import Network
 
 
 def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> dict[int, np.ndarray]:
-    """Return the stress of each cell times the thickness over the reference stiffness [1].
-
-    By number of corners, shape (n_cells, 3): xx, yy, xy.
-    """
+    """Return stresses xx, yy, xy (n_cells, 3) by corner count, times thickness over reference stiffness [1]."""
     mesh = network.mesh
     place = mesh.points if linear else mesh.points + displacements
     vectors = place[network.second] - place[network.first]
@@ -55,11 +50,7 @@ def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> 
 def particle_stresses(
     mesh: Mesh, stresses: Mapping[int, np.ndarray], chosen: Mapping[int, np.ndarray] | None = None
 ) -> np.ndarray:
-    """Return the stress at the particles, shape (n_points, 3), from that of the cells, in the same unit.
-
-    `chosen` selects the cells of one part of the body, by number of corners, since stress jumps between materials.
-    NaN at particles without such a cell.
-    """
+    """Return the stress at the particles (n_points, 3) from `chosen` cells, of one part; NaN without one."""
     # Corner by corner of the cells: the side to the next corner, and stress and middle of the cell.
     sides_of, values, middles, number = [], [], [], 0
     for count, cells in mesh.cells.items():
