@@ -1,12 +1,10 @@
 r"""Post-processing of references: fields, limits of small strain, scales of unit problems.
 
-A cantilever under a dead end load is the elastica :math:`\theta'' = -\alpha \cos\theta`, :math:`\alpha = F L^2 / (E
-I)`. Its end deflects by :math:`4/35\,\alpha^2` less than in small strain, where it turns by :math:`\alpha/2`;
-`elastica` has the closed form at any load.
+A cantilever under a dead end load is the elastica :math:`\theta'' = -\alpha \cos\theta`,
+:math:`\alpha = F L^2 / (E I)`. It deflects by :math:`4/35\,\alpha^2` less than in small strain.
 
-The unit problem of a small-strain reference has lengths over half the height and stresses over the traction. Only the
-aspect ratio, Poisson's ratio and the kind of load remain: beams that differ in size, thickness or Young's modulus
-share it.
+The unit problem has lengths over half the height and stresses over the traction. Only the aspect ratio, Poisson's ratio
+and the kind of load remain, so beams share it.
 """
 
 from collections.abc import Callable
@@ -24,11 +22,9 @@ from ..problem.materials import Material
 class BeamField:
     """Displacements of a beam that a reference finds.
 
-    - `displacement`: Displacement of the load, see `springtune.problem.loads` [m].
+    - `displacement`, `error_estimate`: Displacement of the load [m], and a bound on its relative error [1].
     - `mean_displacement`: Mean displacement of the loaded side along the force [m].
-    - `error_estimate`: Bound on the relative error of `displacement` [1].
-    - `x`, `y` (n_x,) and (n_y,): Grid of the field at rest [m], denser near the outline.
-    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
+    - `displacements` (n_x, n_y, 2): On the grid `x`, `y` at rest [m], denser near the outline.
     """
 
     displacement: float
@@ -54,10 +50,7 @@ JUDGED_AREA_SHARE = 0.95
 
 
 def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[float, float]:
-    """Return the rotation [rad] and principal strain [1] that 95 % of a body do not exceed, in small strain.
-
-    `x` (n_x,) and `y` (n_y,) are an ascending grid [m], with `displacements` (n_x, n_y, 2) [m].
-    """
+    """Return the rotation [rad] and principal strain [1] that 95 % of a body do not exceed, in small strain."""
     middle = [(displacements[:, 1:] + displacements[:, :-1]) / 2, (displacements[1:] + displacements[:-1]) / 2]
     by_x = np.diff(middle[0], axis=0) / np.diff(x)[:, None, None]
     by_y = np.diff(middle[1], axis=1) / np.diff(y)[None, :, None]
@@ -66,10 +59,7 @@ def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray)
 
 
 def most_rotation_and_strain(gradients: np.ndarray, areas: np.ndarray) -> tuple[float, float]:
-    """Return `rotation_and_strain` of displacement `gradients` (n, 2, 2) [1] with their `areas` (n,) [m2].
-
-    Axes of gradients: component, then coordinate.
-    """
+    """Return `rotation_and_strain` of `gradients` (n, 2, 2), by component and coordinate, with `areas` (n,)."""
     by_x, by_y = gradients[..., 0], gradients[..., 1]
     rotation = np.abs(by_x[..., 1] - by_y[..., 0]) / 2
     mean, half = (by_x[..., 0] + by_y[..., 1]) / 2, (by_x[..., 0] - by_y[..., 1]) / 2
@@ -88,8 +78,8 @@ def _area_quantile(values: np.ndarray, areas: np.ndarray) -> float:
 def elastica(load: float) -> float:
     r"""Return the end deflection of a cantilever under a dead load across it, over its length [1].
 
-    `load` is :math:`\alpha = F L^2 / (E I)` [1], at least 0. With the turn :math:`\psi` of the end, :math:`p^2 = (1 +
-    \sin\psi)/2` and :math:`\sin\varphi = 1/(\sqrt 2 p)` (Bisshopp and Drucker, Quart. Appl. Math. 3:272, 1945)
+    `load` is :math:`\alpha = F L^2 / (E I)` >= 0. With the turn :math:`\psi` of the end, :math:`p^2 = (1 + \sin\psi)/2`
+    and :math:`\sin\varphi = 1/(\sqrt 2 p)` (Bisshopp and Drucker, Quart. Appl. Math. 3:272, 1945)
 
     .. math:: \sqrt\alpha = K(p) - F(p, \varphi), \qquad
         w / L = 1 - \tfrac{2}{\sqrt\alpha} (E(p) - E(p, \varphi)).
@@ -142,10 +132,9 @@ if TYPE_CHECKING:
 
 
 def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Interpolate displacements (n_x, n_y, 2) [m] on an ascending grid at points (n, 2) inside [m], by cubic splines.
+    """Interpolate displacements (n_x, n_y, 2) on an ascending grid at points (n, 2) inside, by cubic splines.
 
-    On the grid of a `ReferenceSolution` within 1e-5 of the largest displacement; the error is mostly at a clamp's
-    corners.
+    On the grid of a `ReferenceSolution` within 1e-5 of the largest one; the error is mostly at a clamp's corners.
     """
     from scipy.interpolate import RectBivariateSpline  # here: whoever wants the outline alone does without
 
@@ -173,9 +162,6 @@ def unit_problem(beam: Beam, material: Material, kind: LoadKind) -> tuple[float,
 
 
 def unit_scales(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float]:
-    """Return the scales of lengths and displacements of the unit problem.
-
-    Half the height [m]; and for 1 N half the height times the traction over Young's modulus [m].
-    """
+    """Return the unit problem's scales: half the height, and that times the traction of 1 N over E [m]."""
     side = kind.side_length(beam)
     return beam.height / 2, beam.height / 2 / (side * beam.thickness * material.in_plane.young_modulus)

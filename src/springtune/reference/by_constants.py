@@ -1,8 +1,7 @@
 r"""Finite elements whose stiffness is linear in constants: displacements, and their exact derivatives.
 
 With :math:`K = \sum_i c_i K_i` and :math:`K u = f` the derivative along a direction s of the constants solves
-:math:`K u' = -\sum_i s_i K_i u`: one more solve with the same factor. Elements are those of
-`springtune.reference.shapes`.
+:math:`K u' = -\sum_i s_i K_i u`.
 """
 
 from collections.abc import Mapping
@@ -26,11 +25,7 @@ ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
 
 
 class Family:
-    """A shape under a load case for any constants, on a level that is fine enough for some `materials`.
-
-    `forces` are those on the unknowns [N], `groups` the names of sides and points. `reference` is the solution for
-    these materials.
-    """
+    """A shape under a load case for any constants, on a level that is fine enough for some `materials`."""
 
     def __init__(
         self, shape: Shape, load: LoadCase, grouped: GroupedMesh | None, materials: Mapping[str, AnyMaterial]
@@ -52,11 +47,7 @@ class Family:
                 self._all.append(csr_array((level._matrices().ravel(), places), shape=2 * self.forces.shape))
 
     def solve(self, constants: np.ndarray) -> np.ndarray:
-        """Return displacements (unknowns, n).
-
-        The first column of `constants` (n_constants, n) has `ENTRIES` of each part, and yields values; the others have
-        directions, and yield the derivatives along them.
-        """
+        """Return displacements (unknowns, n): of the first column of `constants`, then derivatives along the others."""
         free, whole = self._free, self._all[0].copy()
         whole.data = constants[:, 0] @ np.stack([one.data for one in self._all])
         factor = factorize(csc_array(whole[free][:, free]))

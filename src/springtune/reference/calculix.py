@@ -1,8 +1,4 @@
-"""CalculiX as a second opinion and as an approach of the benchmark: input, run and answer.
-
-Beams and loads are those of `springtune.problem.loads`. The program is `ccx` (Debian package calculix-ccx), run in
-its own folder.
-"""
+"""CalculiX (`ccx`) as a second opinion and as an approach of the benchmark: input, run and answer."""
 
 import re
 import shutil
@@ -17,10 +13,7 @@ from ..problem.materials import Material
 
 
 def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (n_points, 2) [m] and serendipity quadrilaterals (n_elements, 8) of about even size [m].
-
-    Corners counter-clockwise, then the middles of the sides from the first corner on.
-    """
+    """Return points [m] and serendipity quadrilaterals (n_elements, 8): corners, then the middles of their sides."""
     columns, rows = max(1, round(length / size)), max(1, round(height / size))
     # Nodes on a grid of half the element size; the middles of elements stay without one.
     count = 2 * rows + 1
@@ -57,9 +50,7 @@ def solve(
 ) -> np.ndarray:
     """Return displacements [m] at small strain, or neo-Hookean ones at finite strain.
 
-    Elements of plane stress, ``CPS3`` or ``CPS8``, are those of plane strain for a material in plane strain.
-    `points` (n_points, 2) [m], `elements` (n_elements, 3 or 8), `thickness` [m], `load` (n_points, 2) [N], `held`
-    (n_points, 2).
+    `elements` (n_elements, 3 or 8) are in plane stress, or in plane strain if the material is.
     """
 
     def lines(rows: Iterable[Iterable[object]]) -> str:

@@ -57,10 +57,7 @@ LEAST_SIDES_ALONG = 4
 
 @dataclass(frozen=True)
 class Side:
-    """Side of a triangle on the outline or between parts.
-
-    `span` is the arc's parameters at the corner of the lower number and at the other one.
-    """
+    """Side of a triangle on the outline or between parts; `span` runs from the lower corner's parameter on the arc."""
 
     groups: tuple[str, ...] = ()
     arc: OutlineSide | None = None
@@ -69,10 +66,7 @@ class Side:
 
 @dataclass(eq=False)
 class CoarseMesh:
-    """Triangles and their sides on the outline and between parts.
-
-    `points` (n_points, 2) [m], `triangles` (n, 3) counter-clockwise, `parts` (n,) numbers of their parts.
-    """
+    """Triangles (n, 3), counter-clockwise, their parts' numbers (n,), and sides on the outline and between parts."""
 
     points: np.ndarray
     triangles: np.ndarray
@@ -280,10 +274,7 @@ def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[
 def outline_mesh(
     shape: Shape, grouped: GroupedMesh | None, points: Mapping[str, Point], largest_turn: float = LARGEST_TURN
 ) -> CoarseMesh:
-    """Make coarse triangles of a shape, by netgen's advancing front.
-
-    Named `points` [m] become corners; `largest_turn` limits the turn of a side along an arc [rad].
-    """
+    """Make coarse triangles of a shape by netgen, with corners at `points` and arcs cut every `largest_turn` [rad]."""
     if grouped is None:
         names = ("", *shape.parts)
         numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
@@ -406,8 +397,7 @@ def corners_of(
 ) -> dict[int, Corner]:
     """Return the corners where a solution may not be smooth.
 
-    Free sides have infinite stress at re-entrant corners of more than half a turn (Williams 1952); a symmetry side
-    doubles the angle.
+    Between free sides those of more than half a turn (Williams 1952); a symmetry side doubles the angle.
     """
     at_sides = mesh.part_sides()
     at_corner: dict[int, list[_Ends]] = {}

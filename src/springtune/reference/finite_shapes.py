@@ -1,12 +1,10 @@
-r"""Reference for a shape at finite strain: each material by a law of its own, on the levels of `shapes`.
+"""Reference for a shape at finite strain: each material by a law of its own, on the levels of `shapes`.
 
-Unknowns, supports, loads and quantities are those of `springtune.reference.shapes`, laws and Newton's method those of
-`springtune.reference.finite_strain`. Tractions and gravity keep their direction, pressures that follow turn and grow
-with their sides. A stress is a force over the length that it acts on now and the thickness at rest, as that of a
-network. The first level goes from rest in steps that are watched for snaps; each finer one begins at the last.
+Tractions and gravity keep their direction; pressures that follow turn and grow with their sides. A stress is a force
+over the length that it acts on now and the thickness at rest, as that of a network.
 
-Strain is infinite at a clamped corner, and a free side that is pressed there creases in ever smaller places. From the
-level on that has no stable equilibrium for this, triangles at such corners keep the degree of the last one that has.
+Strain is infinite at a clamped corner, and a free side that is pressed there creases in ever smaller places. Where a
+level has no stable equilibrium for this, triangles at such corners keep the degree of the last one that has.
 """
 
 from collections.abc import Mapping
@@ -38,8 +36,7 @@ def solve_finite_shape(
 ) -> ShapeReference:
     """Solve for the displacements of a shape at finite strain, as `solve_shape`.
 
-    `law` is ``"rubber"``, by which isotropic materials have `law_of`, or ``"st-venant"``; anisotropic ones always have
-    that of St. Venant and Kirchhoff.
+    `law` is ``"rubber"`` or, always for anisotropic materials, ``"st-venant"`` (St. Venant and Kirchhoff).
     """
     return solve_shape(shape, load, materials, grouped, TOLERANCE, _Levels(materials, law == "rubber"))
 
@@ -97,11 +94,7 @@ class _PartLaws:
 
 
 class _FiniteLevel(Level, Body):
-    """A shape solved at finite strain on one level.
-
-    One layer at corners: nearer to them strain grows without end, and a law that gives way when pressed has no
-    equilibrium.
-    """
+    """A shape solved at finite strain on one level, with one layer at corners: nearer, strain grows without end."""
 
     most_layers = 1
 

@@ -1,17 +1,14 @@
-r"""Reference at finite strain: a rubber sheet by quadratic finite elements.
+r"""Reference at finite strain: a rubber sheet by quadratic finite elements, neo-Hookean or of Yeoh's law.
 
-It is neo-Hookean in plane stress or plane strain, or of Yeoh's law in plane stress. The neo-Hookean energy is that of
-CalculiX and Abaqus,
+The neo-Hookean energy is that of CalculiX and Abaqus, with mu and K of the material at small strain,
 
-.. math:: W = \tfrac{\mu}{2} (J^{-2/3} I_1 - 3) + \tfrac{K}{2} (J - 1)^2,
+.. math:: W = \tfrac{\mu}{2} (J^{-2/3} I_1 - 3) + \tfrac{K}{2} (J - 1)^2.
 
-with mu and K of the material at small strain. In plane stress the stretch across the sheet is eliminated in every
-point; an incompressible material, nu = 0.5, has :math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the in-plane deformation, and
-Yeoh's law is a polynomial of this bracket.
+In plane stress the stretch across the sheet is eliminated in every point; for nu = 0.5 then
+:math:`W = \mu/2 (I_1 + J^{-2} - 3)` in the plane, and Yeoh's law is a polynomial of this bracket.
 
-Kinds of load are those of `springtune.problem.loads`. If the force acts across the loaded side, half of the beam is
-solved, which does not buckle; else the whole, since large rotations break the symmetry. Elements shrink towards the
-corners, and the load grows in steps if needed.
+If the force acts across the loaded side, half of the beam is solved, which does not buckle; else the whole, since large
+rotations break the symmetry.
 """
 
 from abc import ABC, abstractmethod
@@ -64,12 +61,10 @@ class FiniteStrainError(ReferenceNotConvergedError):
 
 @dataclass(frozen=True)
 class FiniteStrainSolution(BeamField):
-    """Displacements of a beam at finite strain.
+    """Displacements of a beam at finite strain; `profile` [m], along the force, at `positions` on the loaded side.
 
-    - `error_estimate`: Relative difference to the coarser mesh, several times the error, plus the errors of
-      Newton's method and rounding. Under pressure twice the larger one of the middle and the mean.
-    - `positions`, `profile` (n,): Places on the loaded side over its length [1], ascending, and displacements there
-      along the force [m].
+    `error_estimate` is the relative difference to the coarser mesh, several times the error, plus the errors of
+    Newton's method and rounding; under pressure twice the larger one of the middle and the mean.
     """
 
     positions: np.ndarray
@@ -79,10 +74,7 @@ class FiniteStrainSolution(BeamField):
 def solve_finite_strain(
     beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "", follower: bool = False
 ) -> FiniteStrainSolution:
-    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards.
-
-    The plane is the material's unless one is given.
-    """
+    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards."""
     law = law_of(material, plane or material.plane)
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in ELEMENT_COUNTS]
@@ -109,13 +101,8 @@ def _mesh_difference(coarse: FiniteStrainSolution, fine: FiniteStrainSolution, k
 class Body:
     """Problem at finite strain: elements with a law, supports and a growing load.
 
-    - `law`: `PlaneLaw` at points of integration.
-    - `nodes_of` (elements, functions): Functions of each element.
-    - `gradients` (elements, points, 2, functions), `weights` (elements, points): Of the functions, at points of
-      integration; weights are times the unit of stress.
-    - `load`, `held`, `given` (functions, 2): Forces, what is held, and displacements prescribed there.
-    - `turning`: What displacements add to the load.
-    - `extent`: Size of the body.
+    `gradients` (elements, points, 2, functions) and `weights` (elements, points), times the unit of stress, are at
+    points of integration; `load`, `held` and `given` are (functions, 2); `turning` is the load by displacements.
     """
 
     law: "Law"
@@ -129,10 +116,7 @@ class Body:
     extent: float
 
     def moved(self, stress: float, name: str, watched: bool = True) -> tuple[np.ndarray, float]:
-        """Return the equilibrium under so many times the load, and what rounding leaves of it, relative.
-
-        It is reached in steps, which are watched for snaps.
-        """
+        """Return the equilibrium under so many times the load, in watched steps, and its relative rounding error."""
         path, step = [(0.0, np.zeros(self.load.shape))], 1.0
         while path[-1][0] < 1:
             done = path[-1][0]
@@ -193,9 +177,8 @@ class Body:
     def equilibrium(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float, bool] | None:
         """Return the equilibrium, its relative rounding error, and whether it is stable; None if there is none.
 
-        Strains at integration points are separate unknowns, which agree with the displacements in the end (Magisano,
-        Leonetti and Garcea, Int. J. Numer. Meth. Engng 109:1237, 2017). Otherwise a slender beam that turns would
-        stretch on the way, and steps would have to be small.
+        Strains at integration points are separate unknowns (Magisano, Leonetti and Garcea, Int. J. Numer. Meth. Engng
+        109:1237, 2017): otherwise slender beams that turn would need small steps.
         """
         free, strain = ~self.held.ravel(), None
         moved = np.where(self.held, stress * self.given, moved)
@@ -306,10 +289,7 @@ class _Sheet(Body):
         self.turning = _turning(side, shapes, kind.along) if follower else csr_array((places.size, places.size))
 
     def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
-        """Equilibrium under the whole load, reached in steps, which are watched for snaps.
-
-        Lengths are over half the height; its error estimate is what rounding leaves.
-        """
+        """Equilibrium under the whole load, reached in watched steps; lengths are over half the height."""
         moved, uncertain = self.moved(stress, name, watched)
         mean = float((self.load * moved).sum() / self.load.sum())
         kind, (x, y, field) = self.kind, self._field(moved)
@@ -432,8 +412,7 @@ class PlaneLaw(ABC):
     def response(self, strain: np.ndarray) -> "Response":
         """Return stress and tangent at Green's strains xx, yy and 2 xy, shape (..., 3) [1].
 
-        The energy is one of the trace t and the determinant d of C = 1 + 2 E in the plane. With the cofactor a of C,
-        S = 2 (W_t 1 + W_d a).
+        The energy depends on t = tr C and d = det C, C = 1 + 2 E: with C's cofactor a, S = 2 (W_t 1 + W_d a).
         """
         c = np.stack([1 + 2 * strain[..., 0], 1 + 2 * strain[..., 1], strain[..., 2]], axis=-1)
         determinant = c[..., 0] * c[..., 1] - c[..., 2] ** 2

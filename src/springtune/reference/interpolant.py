@@ -1,14 +1,11 @@
 r"""Tensor Chebyshev interpolant of a unit problem: thousands of beams for tens of solves.
 
-The unit problem (`springtune.reference.answers`) depends on the aspect ratio a and Poisson's ratio nu alone, and
-is analytic in :math:`(\log a, \nu)`. Logarithms of its answers are interpolated: displacements are powers of the
-aspect ratio towards either end, hence straight lines in :math:`\log a`, for any kind of load. The Chebyshev
-coefficients fall geometrically (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), and
-with them the error.
+The unit problem is analytic in :math:`(\log a, \nu)`, with the aspect ratio a. Logarithms of its answers are
+interpolated, nearly straight lines in :math:`\log a`. The Chebyshev coefficients fall geometrically, and with them the
+error (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2).
 
-Nodes are Chebyshev points with both ends, so twice as many intervals reuse all solves. They are doubled along the
-axis with the larger expected error. Then solves between nodes decide: the largest difference, times a factor, enters
-the error estimate.
+Intervals are doubled along the axis with the larger expected error, and reuse all solves. Then solves between nodes
+decide: the largest difference, times a factor, enters the error estimate.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,10 +38,7 @@ MOST_NODES = 65
 """Most nodes along an axis."""
 
 LIMITS_TOLERANCE = 0.05
-"""Largest relative difference of rotation and strain at the checks.
-
-They jump by a percent, since their grid changes with the aspect ratio.
-"""
+"""Largest relative difference of rotation and strain at the checks; they jump by a percent with the grid."""
 
 BOX_TOLERANCE = 1e-9
 """How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
@@ -59,11 +53,7 @@ class NotCertifiedError(RuntimeError):
 
 @dataclass(frozen=True)
 class Answers:
-    """Answers of unit problems, as in `springtune.reference.small_strain.ReferenceSolution`.
-
-    In units of half the height and of the traction over Young's modulus; `error_estimate` bounds the relative error
-    of each displacement [1].
-    """
+    """Answers of unit problems: over half the height and over the traction over Young's modulus."""
 
     displacement: np.ndarray
     mean_displacement: np.ndarray
@@ -76,9 +66,8 @@ class Answers:
 class Interpolant:
     """Answers of the unit problems of one kind of load over a box of aspect ratios and Poisson's ratios.
 
-    - `aspect_range`, `nu_range`: First and last aspect ratio and Poisson's ratio [1].
-    - `values` (4, n_aspect, n_nu): At the nodes, last to first, in the order of `ANSWER_NAMES`: logarithms of
-      displacement, mean displacement, 1 plus rotation over strain (rotation can be zero), and strain.
+    - `values` (4, n_aspect, n_nu): At the nodes, last to first: logarithms of displacement, mean displacement, 1 plus
+      rotation over strain (rotation can be zero), and strain.
     - `error_estimate`: Bound on the relative error of each displacement [1]: `SAFETY_FACTOR` times the largest
       difference at the checks, plus the largest error estimate of the solves.
     - `solves`: Number of unit problems solved, with checks.
@@ -101,11 +90,7 @@ class Interpolant:
         most: int | None = None,
         solve: Callable[..., ReferenceSolution] = solve_unit,
     ) -> Self:
-        """Build an interpolant over a box, with as many solves as it needs.
-
-        `aspect_range` and `nu_range` (-1 < nu <= 0.5) are first and last values [1], equal for a function of the
-        other alone; `tolerance` is the largest accepted relative error estimate [1].
-        """
+        """Build an interpolant over a box of aspect ratios and Poisson's ratios, with as many solves as it needs."""
         box = _Box(kind, aspect_range, nu_range, tolerance, most, solve)
         values, error_estimate = box.certified()
         return cls(kind, aspect_range, nu_range, values, error_estimate, len(box.solved))
@@ -257,11 +242,7 @@ def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
 
 
 def _expected_error(values: np.ndarray) -> float:
-    """Return the interpolation error expected from the decay of Chebyshev coefficients along the second axis.
-
-    Coefficients are taken in pairs, since every other one of an even function is zero. The last pair's ratio to the
-    one before extrapolates what is left out.
-    """
+    """Return the error expected from the decay of pairs of Chebyshev coefficients along the second axis."""
     count = values.shape[1]
     if count == 1:
         return 0.0

@@ -1,8 +1,7 @@
-r"""Reference for a shape: linear elasticity at small strain, plane stress, by finite elements on the shape itself.
+"""Reference for a shape: linear elasticity at small strain, plane stress, by finite elements on the shape itself.
 
-Triangles follow straight and curved sides. From level to level their polynomial degree rises, and the number of
-layers that shrink towards possibly singular corners: re-entrant ones, ends of supports and loads, joints of
-materials. The error then falls exponentially (hp version), as in `springtune.reference.small_strain`.
+From level to level the polynomial degree rises, and the number of layers that shrink towards possibly singular corners:
+the error falls exponentially (hp version).
 """
 
 from collections.abc import Callable, Mapping
@@ -56,14 +55,11 @@ Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class ShapeReference:
     """Converged displacements of a shape under a load case.
 
-    - `values`: Quantities of interest, in SI units; exactly zero if less than ten times their error bound, as by
-      symmetry.
-    - `error_estimates`: Relative error bounds [1]: over the value, or over a thousandth of the body's largest value
-      of its kind if that is larger.
+    - `values`: Quantities of interest, in SI units; zero if less than ten times their error bound, as by symmetry.
+    - `error_estimates`: Relative error bounds [1]: over the value, or over a thousandth of the body's largest value of
+      its kind if that is larger; such `negligible` quantities have meaningless relative errors.
     - `energy`: Strain energy [J].
     - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
-    - `negligible`: Quantities below a thousandth of the largest of their kind, whose relative errors are
-      meaningless.
     - `note`: Why error estimates are larger than those of other references, or an empty string.
     """
 
@@ -82,8 +78,7 @@ class ShapeReference:
     def at(self, points: np.ndarray) -> np.ndarray:
         """Return displacements [m] at points of the body, (n, 2) [m]; just outside, by extrapolation.
 
-        Error estimates cover only quantities of interest: in published benchmarks displacements elsewhere are off by
-        up to 4e-4 of the largest one at the tolerance 1e-4.
+        No error estimate covers them: in published benchmarks they are off by up to 4e-4 at the tolerance 1e-4.
         """
         return self._factor * self._level.displacements(points)
 
@@ -116,15 +111,12 @@ def solve_shape(
     r"""Solve for the displacements of a shape under a load case, at small strain in plane stress.
 
     `grouped` is the mesh of a shape from a file: the polygon around its cells is the geometry. `tolerance` is the
-    largest accepted relative error estimate [1]; ten times as much for stresses. `level_of` is a `Level` with
-    other loads or supports.
+    largest accepted relative error estimate [1], of stresses ten times as much.
 
-    A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` one
-    more layer scales the missing energy of the innermost triangles by :math:`.2^{2\lambda}`, and one more degree that
-    of the others similarly. So steps from level to level fall geometrically: while each is at most half of the last,
-    all later ones together are at most the last one. Other quantities than the energy may take a step that is small
-    by chance: the estimate is the larger of the last step and a quarter of the one before, and steps must be seen to
-    halve.
+    A level of degree p has p layers at each corner. With :math:`u \sim r^\lambda` one more layer scales the missing
+    energy by :math:`.2^{2\lambda}`, one more degree similarly. So steps from level to level fall geometrically: while
+    each is at most half of the last, all later ones together are at most the last one. A step may be small by chance:
+    the estimate is the larger of the last step and a quarter of the one before, and steps must be seen to halve.
 
     Curves are polynomials of the level's degree (isoparametric), reactions are the work of the solution on a unit
     displacement of their group, and stresses are not smoothed.
@@ -187,10 +179,7 @@ def solve_each(
     grouped: GroupedMesh | None = None,
     solve: Callable[..., ShapeReference] | None = None,
 ) -> tuple[list[ShapeReference], dict[str, str]]:
-    """Return references that together have every quantity of interest that converges, and the faults of the others.
-
-    A quantity without a limit, such as the stress at a corner, does not affect the others. `solve` is as `solve_shape`.
-    """
+    """Return references that together have every quantity of interest that converges, and the faults of the others."""
     try:
         return [(solve or solve_shape)(shape, load, materials, grouped)], {}
     except (ReferenceNotConvergedError, ValueError) as error:
@@ -208,16 +197,10 @@ def solve_each(
 def refusal_reason(estimate: float, accepted: float, before: float, last: float) -> str:
     """Return why an error estimate is refused, or an empty string; `before` and `last` are the last two steps.
 
-    All are relative, over the same [1].
-
-    Examples
-    --------
     >>> refusal_reason(1e-4, 1e-5, 3e-4, 1e-4)
     'the tolerance is 1.0e-05'
     >>> refusal_reason(1e-5, 1e-4, 1.5e-5, 1e-5)
     'within the tolerance of 1.0e-04, but it is no bound: steps do not halve yet, 1.5e-05 and then 1.0e-05'
-    >>> refusal_reason(1e-5, 1e-4, 4e-5, 1e-5)
-    ''
     """
     if not estimate <= accepted:
         return f"the tolerance is {accepted:.1e}"
@@ -442,10 +425,7 @@ class Space:
         return np.concatenate([np.array(ends), np.arange(first, first + per_side)])
 
     def jacobians(self, gradients: np.ndarray, rows: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the places, shape (n, points, 2, 2), last by reference coordinate, and their determinants.
-
-        Determinants have the sign of their triangle everywhere: a folded triangle is refused.
-        """
+        """Derivatives of places (n, points, 2, 2), last by reference coordinate, and determinants; refuse folds."""
         at = self.places[self.numbers[rows]]
         derivatives = np.einsum("eic,qia->eqca", at, gradients, optimize=True)
         determinants = derivatives[..., 0, 0] * derivatives[..., 1, 1] - derivatives[..., 0, 1] * derivatives[..., 1, 0]
@@ -477,11 +457,10 @@ VOIGT = np.array([[0, 2], [2, 1]])
 
 
 class Level:
-    """A shape solved on one level.
+    """A shape solved on one level; triangles at corners have at most `kept_degree`, if it is not zero.
 
-    Triangles at corners have no more than `kept_degree`, if it is not zero: the last one of which whole levels have a
-    solution. What their functions of higher degree would change is estimated as twice the larger one of the last two
-    steps of whole levels, and `note` says so.
+    What their functions of higher degree would change is estimated as twice the larger one of the last two steps of
+    whole levels, and `note` says so.
     """
 
     most_layers = HIGHEST_DEGREE
@@ -607,10 +586,7 @@ class Level:
     def _solve(
         self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return coefficients and residual forces, shape (n_functions, 2), and the strain energy.
-
-        Inner functions are eliminated triangle by triangle.
-        """
+        """Return coefficients and residual forces, both (n_functions, 2), and the strain energy."""
         space = self.space
         n, outer = len(space.corners), 2 * space.n_local_outer
         numbers = (2 * space.numbers[:, :, None] + np.arange(2)).reshape(n, -1)

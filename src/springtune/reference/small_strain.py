@@ -1,7 +1,6 @@
 """Reference for a beam: linear elasticity at small strain, plane stress, by finite elements.
 
-Kinds of load are those of `springtune.problem.loads`. Half of each beam is solved; the dashed line is its axis of
-symmetry or antisymmetry::
+Half of each beam is solved; the dashed line is its axis of symmetry or antisymmetry::
 
         axial                          bending                            shear
           ____________________ ->        ____________________            o  o  o  o  o  o
@@ -10,12 +9,8 @@ symmetry or antisymmetry::
         //|__________________|->       //|__________________||          +-------:-------+
                                                                         ///////////////
 
-The kind ``"face"`` is shear with a force along y and no rollers. Other kinds with symmetric supports are solved
-alike: the upper half if an end is loaded, else the left half.
-
-The stress is singular where a clamp meets a free edge, so even quadratic elements converge slowly. Here rectangles
-shrink geometrically towards the corners, and their degree grows with the number of layers. The error then falls
-exponentially (hp version), to 1e-6 with some thousand unknowns.
+The stress is singular where a clamp meets a free edge. Rectangles shrink geometrically towards the corners, and their
+degree grows with the number of layers: the error falls exponentially (hp version), to 1e-6 with some thousand unknowns.
 """
 
 from dataclasses import dataclass, replace
@@ -78,11 +73,7 @@ class ReferenceNotConvergedError(RuntimeError):
 
 @dataclass(frozen=True)
 class ReferenceSolution(BeamField):
-    """Converged displacements of a beam at small strain.
-
-    - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
-    - `unknowns`: Unknowns of the finest level, for the solved half.
-    """
+    """Converged displacements of a beam, with `rotation` [rad] and `strain` [1] as limits of small strain."""
 
     rotation: float
     strain: float
@@ -98,35 +89,19 @@ class ReferenceSolution(BeamField):
 def solve_small_strain(
     beam: Beam, material: Material, force: float, tolerance: float = 1e-4, kind: LoadKind = AXIAL
 ) -> ReferenceSolution:
-    r"""Solve a beam under a load by hp finite elements at small strain.
+    r"""Solve a beam under a load [N], axial tension positive, by hp finite elements at small strain.
 
-    `force` [N] is spread evenly over the loaded side, axial tension positive; -1 < nu <= 0.5. `tolerance` is the
-    largest accepted relative error estimate [1].
-
-    Notes
-    -----
-    The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.answers`.
-
-    The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive
-    levels are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and the error is the sum of
-    all later steps :math:`d_p = J_p - J_{p-1}`. These fall geometrically: with :math:`u \sim r^\lambda` at a corner
-    one more layer scales the missing energy of the innermost element by :math:`.2^{2\lambda}`, and one more degree
-    that of the others similarly. For a clamped edge that meets a free one at a right angle (M. Williams, J. Appl.
-    Mech. 19:526, 1952)
+    The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of levels are
+    nested, so its values :math:`J_p` rise towards the exact one (Ritz), and the error is the sum of all later steps.
+    With :math:`u \sim r^\lambda` at a corner one more layer scales the missing energy of the innermost element by
+    :math:`.2^{2\lambda}`, one more degree similarly. For a clamped edge that meets a free one at a right angle (M.
+    Williams, J. Appl. Mech. 19:526, 1952)
 
     .. math:: \sin^2(\lambda\pi/2) = \frac{4}{(3-\nu)(1+\nu)} - \frac{1+\nu}{3-\nu}\lambda^2,
 
     so lambda = .69 at nu = .5 and .76 at .3, factors of .11 and .09; measured .07 to .12. While each step is at most
-    half of the last, all later ones together are at most the last one, which is the error estimate; steps must be
-    seen to halve. It exceeds the true error some tenfold.
-
-    Examples
-    --------
-    >>> from springtune.problem.geometry import Beam
-    >>> from springtune.problem.materials import Material
-    >>> solution = solve_small_strain(Beam(0.2, 0.04), Material(210e9, 0.3), 400e3)
-    >>> round(solution.displacement * 1e3, 3)
-    9.501
+    half of the last, all later ones together are at most the last one, which is the error estimate; steps must be seen
+    to halve. It exceeds the true error some tenfold.
     """
     if not kind.mirrored:
         raise ValueError(f"supports of '{kind}' are not symmetric; half of a beam is solved")
@@ -186,10 +161,7 @@ def _bending_ratio(aspect_ratio: float, kind: LoadKind) -> float:
 
 
 def _largest_ratio(nu: float, degree: int) -> float:
-    """Return the largest ratio of sides that a level can solve.
-
-    Small elements, and stiff shear as nu tends to -1, worsen the condition of the matrix too.
-    """
+    """Return the largest ratio of sides that a level can solve."""
     return MOST_BENT_RATIO * min(1.0, 2 * (1 + nu)) ** 0.5 * (2 / 3) ** max(degree - 6, 0)
 
 
@@ -197,22 +169,19 @@ class UnitLevel:
     r"""Half of a beam of height 2 with E = 1 under traction 1, solved on one level.
 
     `length` is over half the height [1]. `displacement` is the loaded side's mean along the force, `measured` the
-    displacement of the load, and `round_off` bounds the relative rounding error of both [1].
-
-    The basis on a grid of rectangles is a product of one along x and one along y, so matrices are Kronecker products:
-    milliseconds, for any degree. Each side is held as a whole, so the unknowns are products too.
+    displacement of the load, and `round_off` bounds the relative rounding error of both [1]. The basis is a product of
+    one along x and one along y, so matrices are Kronecker products.
 
     In double precision a slender cantilever loses digits with the fourth power of its aspect ratio. So conjugate
-    gradients refine the solution, with the double-precision factor as preconditioner and residuals :math:`r = l - A
-    u` in extended precision (Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 12). These come
-    from strains, stresses and forces, not from the matrix :math:`A = B^T C B`: large displacements then cancel once,
-    in the strains. The energy is
+    gradients refine the solution with residuals :math:`r = l - A u` in extended precision (Higham, Accuracy and
+    Stability of Numerical Algorithms, 2002, chapter 12). These come from strains, stresses and forces, not from the
+    matrix :math:`A = B^T C B`: large displacements then cancel once, in the strains. The energy is
 
     .. math:: l^T A^{-1} l = l^T u + u^T r + r^T A^{-1} r,
 
-    of which the last term is left out; its size follows from the factor, over the least part of :math:`A` in it that
-    the iteration has met. A count of operations times the unit round-off bounds each rounding (section 3.1), and the
-    displacement's by that times the work :math:`|\sigma|^T |B| |u|`. `round_off` is the sum of both.
+    of which the last term is left out; its size follows from the factor. A count of operations times the unit round-off
+    bounds each rounding (section 3.1), and the displacement's by that times the work :math:`|\sigma|^T |B| |u|`.
+    `round_off` is the sum of both.
     """
 
     def __init__(self, length: float, nu: float, degree: int, kind: LoadKind = AXIAL) -> None:
@@ -335,10 +304,9 @@ class _Grid:
         shear: np.floating,
         other: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.floating]:
-        """Return inner forces in extended precision, and the unsigned work of stresses on the terms of strains.
+        """Return inner forces in extended precision, and the unsigned work of stresses on strains.
 
-        Never by the matrix: so only the large displacements of a slender beam cancel, not its forces. The work is on
-        the strains of `other` unknowns, if given.
+        Never by the matrix: so only the large displacements of a slender beam cancel, not its forces.
         """
         u, v = self.fields(solution)
         (x, x_slope), (y, y_slope) = self._x.series, self._y.series
@@ -367,10 +335,7 @@ class _Grid:
         return fields
 
     def values(self, x: np.ndarray, y: np.ndarray) -> _Values:
-        """Return signs of the displacements on a grid, places of its points in the half, and matrices along x and y.
-
-        A point and its mirror image share one place: matrix products round differently from column to column.
-        """
+        """Return signs of the displacements on a grid, places of its points in the half, and matrices along x and y."""
         signs = np.ones((2, len(x), len(y)))
         odd = 1 - self._kind.axis
         if self._kind.along == 0:
@@ -397,9 +362,9 @@ class _Grid:
 class _Line:
     r"""Polynomials of one degree on the elements of a line, and their matrices, in extended precision.
 
-    Those of an element's ends and the integrals of Legendre polynomials (Szabo and Babuska, Finite Element Analysis,
-    1991, section 3.1): :math:`\sqrt{(2k - 1)/2} \int_{-1}^{\xi} P_{k-1}`, k = 2 to the degree. `mass`, `slope` and
-    `mixed` are the integrals of v w, v' w' and v' w (v: row, w: column), `integrals` those of v.
+    Those of an element's ends and :math:`\sqrt{(2k - 1)/2} \int_{-1}^{\xi} P_{k-1}`, k = 2 to the degree (Szabo and
+    Babuska, Finite Element Analysis, 1991, section 3.1). `mass`, `slope` and `mixed` are the integrals of v w, v' w'
+    and v' w (v: row, w: column), `integrals` those of v.
     """
 
     def __init__(self, points: np.ndarray, degree: int) -> None:

@@ -1,8 +1,7 @@
-r"""Polynomials of any degree on triangles with straight or curved sides.
+"""Polynomials of any degree on triangles with straight or curved sides.
 
-Shape functions are hierarchical (Szabo and Babuska, Finite Element Analysis, 1991, chapter 6): one a corner, degree -
-1 a side and the rest inside. Corners are numbered upwards, so that neighbours agree on a side's direction. scikit-fem
-is not used: its triangles end at degree four, and it assembles one pair of functions a call.
+Shape functions are hierarchical (Szabo and Babuska, Finite Element Analysis, 1991, chapter 6): one a corner, degree - 1
+a side and the rest inside. Corners are numbered upwards, so that neighbours agree on a side's direction.
 """
 
 from functools import lru_cache
@@ -40,10 +39,7 @@ def _side_kernels(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def side_functions(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return shape functions on a side and their slopes, shape (n, degree + 1): its corners', then its own.
-
-    `along` (n,) runs from -1 at the corner of the lower number to 1.
-    """
+    """Return shape functions at `along` in [-1, 1] on a side, and slopes, (n, degree + 1): corners' first."""
     kernel, slope = _side_kernels(degree, along)
     bulge = (1 - along[:, None] ** 2) / 4
     ends = np.stack([(1 - along) / 2, (1 + along) / 2], axis=1)
@@ -53,10 +49,7 @@ def side_functions(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return shape functions (n, n_functions) and gradients (n, n_functions, 2): corners, sides, inside.
-
-    `points` (n, 2) are in the triangle of the corners (0, 0), (1, 0) and (0, 1).
-    """
+    """Return functions (n, n_functions) and gradients (n, n_functions, 2) in a triangle: corners, sides, inside."""
     corners = np.column_stack([1 - points.sum(axis=1), points])
     values, gradients = [corners], [np.broadcast_to(CORNER_GRADIENTS, (len(points), 3, 2))]
 
@@ -106,10 +99,6 @@ def tabulated(degree: int, exact: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 @lru_cache(maxsize=64)
 def side_fit(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points on a side where a curve is met, and the matrix from values there to side functions.
-
-    The points (degree - 1,) are the inner ones of Lobatto's rule, from -1 to 1. The matrix (degree - 1, degree - 1)
-    applies to values less the linear interpolant between the corners.
-    """
+    """Return inner points of Lobatto's rule on a side, and the matrix from values there to side functions."""
     along = np.real(Legendre.basis(degree).deriv().roots())
     return along, np.linalg.inv(side_functions(degree, along)[0][:, 2:])

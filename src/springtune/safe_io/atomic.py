@@ -23,10 +23,7 @@ def writer() -> str:
 
 @contextmanager
 def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
-    """Context that writes a file under another name and renames it when complete.
-
-    After an error nothing is left, and a previous file stays.
-    """
+    """Context that writes a file under another name and renames it when complete; after an error nothing changes."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f"{path.name}.{writer()}{UNFINISHED_ENDING}")
@@ -42,25 +39,14 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
 
 
 def check_folder(path: str | Path) -> None:
-    """Refuse a file whose folder does not exist, rather than create a misspelled one.
-
-    Examples
-    --------
-    >>> check_folder("nowhere/net.csv")
-    Traceback (most recent call last):
-    ...
-    ValueError: nowhere/net.csv: folder nowhere does not exist; make it first
-    """
+    """Refuse a file whose folder does not exist, rather than create a misspelled one."""
     folder = Path(path).parent
     if not folder.exists():
         raise ValueError(f"{path}: folder {folder} does not exist; make it first")
 
 
 def remove_unfinished(folder: str | Path, below: bool = True) -> None:
-    """Remove files in a folder that killed writers left; those of running processes stay.
-
-    On another machine a process counts as running if it wrote within the last hour.
-    """
+    """Remove files in a folder that killed writers left; on other machines, those without a write for an hour."""
     for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED_ENDING}"):
         with suppress(FileNotFoundError):  # just finished, or another run was quicker
             if path.is_file() and not _is_being_written(path):
@@ -95,16 +81,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_json(path: str | Path, content: Any) -> None:
-    """Write JSON atomically.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(Path(folder) / "note.json", {"seconds": 0.25})
-    ...     json.loads((Path(folder) / "note.json").read_text())
-    {'seconds': 0.25}
-    """
+    """Write JSON atomically."""
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 

@@ -12,8 +12,6 @@ PUNCTUATION = re.compile(r"([^\w\s]|_)")
 def shown(text: object) -> str:
     r"""Return a text as one line with its control characters escaped.
 
-    Examples
-    --------
     >>> print(shown("12 faults\x1b[2K\r0 faults\n"))
     12 faults\x1b[2K\r0 faults\n
     """
@@ -23,8 +21,6 @@ def shown(text: object) -> str:
 def printable(text: object) -> str:
     r"""Return a text as one line of printable characters, for a generated program; others are escaped.
 
-    Examples
-    --------
     >>> print(printable("steel\r\nimport os\u200b"))
     steel\r\nimport os\u200b
     """
@@ -34,8 +30,6 @@ def printable(text: object) -> str:
 def json_line(text: str) -> str:
     r"""Return a line of JSON with unseen characters as JSON escapes them.
 
-    Examples
-    --------
     >>> print(json_line('"one\u2028two"'))
     "one\u2028two"
     """
@@ -45,8 +39,6 @@ def json_line(text: str) -> str:
 def xml_comment(text: str) -> str:
     """Return a text as one line for a comment of XML, which must not have two hyphens in a row.
 
-    Examples
-    --------
     >>> print(xml_comment("x---><include/>"))
     x- - -><include/>
     """
@@ -64,8 +56,6 @@ def clipped(text: str, longest: int = SHOWN_CHARACTERS) -> str:
 def rst(text: str) -> str:
     r"""Return a text escaped for reStructuredText.
 
-    Examples
-    --------
     >>> print(rst("`click <javascript:alert(1)>`__"))
     \ \`click \<javascript\:alert\(1\)\>\`\_\_
     """
@@ -76,8 +66,6 @@ def rst(text: str) -> str:
 def no_mathematics(text: str) -> str:
     r"""Return a figure's text with its dollar signs escaped.
 
-    Examples
-    --------
     >>> print(no_mathematics("$x_{"))
     \$x_{
     """

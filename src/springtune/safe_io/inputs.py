@@ -34,13 +34,7 @@ class BeyondBound(MemoryError):
 
 
 def why_unreadable(path: str | Path) -> str:
-    """Return why a file cannot be read, or an empty string; pipes and devices may block or never end.
-
-    Examples
-    --------
-    >>> why_unreadable("nothing.csv"), why_unreadable("/"), why_unreadable("/dev/null")
-    ('No such file or directory', 'Is a directory', 'a pipe or a device, not a file')
-    """
+    """Return why a file cannot be read, or an empty string; pipes and devices may block or never end."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError) as error:  # a ValueError is of a name that no file can have
@@ -76,10 +70,7 @@ THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
 def csv_rows(path: str | Path, refuse: Callable[[str], ValueError], remedy: str) -> Rows:
-    """Read the rows of a CSV file, the head first, without comments after #.
-
-    Semicolons or tabs in the head separate its columns, else commas. Decimal commas become points.
-    """
+    """Read the rows of a CSV file, head first, without # comments; also semicolons, tabs and decimal commas."""
     try:
         lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
     except ValueError as error:
@@ -151,11 +142,9 @@ def virtual_memory() -> int:
 
 @contextmanager
 def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
-    """Context that limits additional memory [bytes] and processor time [s].
+    """Context that limits additional memory [bytes] and processor time [s], as damaged files state any number.
 
-    A damaged file may state any number of points. The memory limit is the process's, shared by threads; the time
-    limit works only in the main thread. Without support by the system there is no limit, and a tighter memory limit
-    stays.
+    Memory is limited for all threads, time only in the main thread; without support by the system nothing is.
     """
     with _memory_lock, _time_limit(seconds):
         used = virtual_memory()

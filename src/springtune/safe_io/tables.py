@@ -23,8 +23,6 @@ def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] 
 def number_text(number: float, unit: str) -> str:
     """Number with unit, lengths in mm; empty for NaN.
 
-    Examples
-    --------
     >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
     ('5 mm', '0.3', '400000 N')
     """
@@ -36,13 +34,7 @@ def number_text(number: float, unit: str) -> str:
 
 
 def mesh_size_text(size: float) -> str:
-    """Mesh size [m] as options take it.
-
-    Examples
-    --------
-    >>> mesh_size_text(0.00308)
-    '3.08 mm'
-    """
+    """Mesh size [m] as options take it: ``3.08 mm``."""
     return f"{1e3 * size:.12g} mm"
 
 
@@ -111,8 +103,6 @@ class TabledList(list[One]):
 def clock(seconds: float) -> str:
     """Readable duration.
 
-    Examples
-    --------
     >>> clock(3.4), clock(75), clock(7300)
     ('3 s', '1:15 min', '2:01 h')
     """
