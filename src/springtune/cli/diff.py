@@ -61,11 +61,7 @@ def diff(
 
     try:
         paths = [reading.dataset_file(before), reading.dataset_file(after)]
-        with (
-            reading.open(paths[0]) as one,
-            reading.open(paths[1]) as other,
-            reading.guarded(f"{paths[0]}, {paths[1]}"),
-        ):
+        with reading.open(paths[0]) as one, reading.open(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
             given = Tolerance(relative, absolute)
             found = compare(one, other, given, groups, ignored, rows)
             click.echo(comparison_text(found, paths, rows))

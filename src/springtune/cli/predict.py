@@ -105,12 +105,7 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
     help=f"Write the springs of what is recommended to a file: {SPRING_FILES}.",
 )
 def predict(
-    sheet: dict[str, Any],
-    error: str | None,
-    load: str | None,
-    springs_alone: bool,
-    target: Path | None,
-    **engine: Any,
+    sheet: dict[str, Any], error: str | None, load: str | None, springs_alone: bool, target: Path | None, **engine: Any
 ) -> None:
     """Recommend a definition for one mesh, with its error under some loads, or find a mesh.
 
@@ -265,10 +260,7 @@ def _refuse_without_factor(why: str) -> "SpringNet":
     help="Rule for the stiffness; `springtune definitions` lists them, `springtune predict` recommends one.",
 )
 @click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
-@click.option(
-    "--load",
-    help="What holds and pulls the beam, nothing without; or a shape, its only load without.",
-)
+@click.option("--load", help="What holds and pulls the beam, nothing without; or a shape, its only load without.")
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
 @click.option(

@@ -25,16 +25,7 @@ from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.boundary_problem import ShapeProblem, unit_reference
 from ..scene.single import Scene
 from .base import ENGINES, Engine, EngineError, Setting
-from .run import (
-    MOST_DRIFT,
-    EngineResult,
-    drift,
-    frame_text,
-    in_engine,
-    net_of,
-    off_text,
-    with_precision,
-)
+from .run import MOST_DRIFT, EngineResult, drift, frame_text, in_engine, net_of, off_text, with_precision
 
 logger = logging.getLogger(__name__)
 

@@ -109,10 +109,5 @@ _declare(110, "Euler", "springs explicit")
 _declare(111, "implicitfast", "springs explicit, dampers implicit", laws=())
 _declare(113, "RK4", "springs explicit, of fourth order")
 _declare(
-    114,
-    "discrete",
-    "springs and dampers implicit",
-    needs=("mujoco>=3.13",),
-    measured="1e-3, ten scenes",
-    iterates=True,
+    114, "discrete", "springs and dampers implicit", needs=("mujoco>=3.13",), measured="1e-3, ten scenes", iterates=True
 )

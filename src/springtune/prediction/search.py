@@ -390,10 +390,7 @@ def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: s
 
 
 def _shape_family(
-    shape: Shape,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
-    load: str,
-    make: Callable[[float], GroupedMesh],
+    shape: Shape, material: AnyMaterial | Mapping[str, AnyMaterial], load: str, make: Callable[[float], GroupedMesh]
 ) -> _Family:
     """Meshes of a shape under a load case."""
     if shape.file:
@@ -427,12 +424,7 @@ class _Search:
     """Search of a family of meshes, from coarse to fine; each mesh is solved once."""
 
     def __init__(
-        self,
-        family: _Family,
-        known: References,
-        estimates: dict[str, float],
-        error: float,
-        most: int,
+        self, family: _Family, known: References, estimates: dict[str, float], error: float, most: int
     ) -> None:
         self.family, self.known, self._estimates, self._error = family, known, estimates, error
         rungs = map(_cells, count())

@@ -497,7 +497,7 @@ class Result(Tabled):
     >>> print(f"error {100 * result.error:+.2f} %, {result.sign_word}", result.sign_words, list(result.errors))
     error +3.52 %, too soft {'displacement': 'too soft'} ['displacement']
     >>> result.write("traction.vtu")[0].name, result.plot().get_title(loc="left")
-    ('traction.vtu', 'traction of 400000 N, lattice\n9.835 mm against 9.501 mm by finite elements, +3.52 % too soft')
+    ('traction.vtu', 'traction of 400000 N, lattice\n9.83451 mm, by finite elements 9.50052 mm: +3.52 % too soft')
     >>> result.displacements.shape, result.stiffness.shape, result.spring_forces.shape
     ((415, 2), (1143,), (1143,))
     >>> print(f"{result.stiffness.max():.4g} N/m, at most {1e-3 * result.spring_forces.max():.1f} kN in a spring")
@@ -649,20 +649,16 @@ class Result(Tabled):
         """
         if not np.isfinite(self.displacement):
             raise ValueError(f"there is no equilibrium to draw: {self.message}")
-        drawing = hook("drawing")
-        return drawing.draw_springs(
-            ax, self.scene.mesh, self.displacements, self.spring_forces, "\n".join(self._title())
-        )
+        draw, title = hook("drawing").draw_springs, self._title()
+        return draw(ax, self.scene.mesh, self.displacements, self.spring_forces, title)
 
-    def _title(self) -> Iterator[str]:
-        """Lines of a figure's title: scene, displacement, its reference and error."""
-        yield f"{self.scene.title}, {self.scene.definition.name}"
-        named = [one.name for one in self.scene.boundary_problem.case.quantities if one.kind == "displacement"]
-        for name in named[:1]:
-            try:
-                reference, error = self.scene.reference_values().get(name, np.nan), self.errors[name]
-            except (RuntimeError, ValueError):
-                reference = error = np.nan
-            moved = f"{1e3 * self.values[name]:.4g} mm"
-            against = f" against {1e3 * reference:.4g} mm by finite elements, {error_text(error)}"
-            yield moved + (f"{against} {self.sign_words[name]}" if error == error else "")
+    def _title(self) -> str:
+        """Scene and definition; below them the displacement, its reference and error."""
+        lines, known = [f"{self.scene.title}, {self.scene.definition.name}"], dict(self._table())
+        named = (one.name for one in self.scene.boundary_problem.case.quantities if one.kind == "displacement")
+        if name := next(named, ""):
+            lines.append(known[name])
+        if error := known.get(f"error of {name}"):
+            reference = number_text(self.scene.reference_values().get(name, np.nan), "m")
+            lines[-1] += f", by finite elements {reference}: {error}"
+        return "\n".join(lines)
