@@ -349,13 +349,13 @@ def _check_mesh_type_names(files: dict[str, Any]) -> dict[str, Any]:
 
 
 class StyleConfig(Section):
-    """Style of the figures."""
+    """Width of figures and size of their text."""
 
     width: fields.Length | None = None
-    """Width of a figure of one column; others have more. 89 mm without."""
+    """Of a column; 89 mm by default."""
 
     font_size: Annotated[float, Field(ge=4, le=24, title="a number of points from 4 to 24")] | None = None
-    """Size of the text in points. 8 without."""
+    """In points; 8 by default."""
 
 
 class StudyConfig(Section):
@@ -384,7 +384,7 @@ class StudyConfig(Section):
     outputs: list[str] = Field([])
 
     style: StyleConfig = Field(default_factory=StyleConfig)
-    """Width of figures and size of their text."""
+    """Style of the figures."""
 
     further_references: OneOrMore[fields.FurtherReference] = []
     """References at finite strain, in addition to small strain: group `/finite_strain`, and `/block` under pressure.
