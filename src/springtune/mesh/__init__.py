@@ -1,20 +1,7 @@
 """Meshes of beams and shapes: their types, quality, checks, named groups and files.
 
-`rows` and `free` mesh beams, `outlines` shapes, and `formats` reads and writes files.
-
-The decorator `mesh_type` declares a function that meshes a box; `MESH_TYPES` finds all that this package's modules
-and the user declare.
-
-Examples
---------
->>> from springtune.mesh import MESH_TYPES, quality
->>> list(MESH_TYPES)
-['structured', 'free', 'right', 'alternating', 'braced', 'isosceles-0.3', 'isosceles-0.5']
->>> mesh = MESH_TYPES["structured"](0.2, 0.04, 5e-3)
->>> print(len(mesh.points), "particles,", len(mesh.edges), "springs")
-415 particles, 1143 springs
->>> print(f"{quality(mesh)['minimum_angle']:.1f} degrees at least")
-29.4 degrees at least
+`rows` and `free` mesh beams, `outlines` shapes, and `formats` reads and writes files. `MESH_TYPES` has all types that
+this package's modules and the user declare with the decorator `mesh_type`.
 """
 
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas

@@ -339,10 +339,8 @@ def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
 
 
 def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return the rows of `chosen` cells (n_chosen, m) among all `cells` (n_cells, m), with corners in the same order.
+    """Return the rows of `chosen` cells among all `cells` (n_cells, m), with corners in the same order.
 
-    Examples
-    --------
     >>> rows_of(np.array([[0, 1, 2], [2, 1, 3], [3, 4, 2]]), np.array([[3, 4, 2], [0, 1, 2]])).tolist()
     [2, 0]
     """
@@ -375,11 +373,7 @@ def corner_angles(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def quality(mesh: Mesh) -> dict[str, float]:
-    """Return quality figures of a mesh.
-
-    ``minimum_angle`` is the smallest angle of all cells [degree], ``edge_length_spread`` the standard deviation of
-    the edge lengths over their mean [1].
-    """
+    """Return the smallest angle [degree], and the standard deviation of the edge lengths over their mean [1]."""
     smallest = min(corner_angles(mesh.points, corners).min() for corners in mesh.cells.values())
     lengths = mesh.edge_lengths
     return {"minimum_angle": float(np.degrees(smallest)), "edge_length_spread": float(lengths.std() / lengths.mean())}

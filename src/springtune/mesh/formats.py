@@ -1,7 +1,4 @@
-"""Mesh files: Gmsh's 4.1 and Abaqus' by readers of their own, all others by meshio.
-
-Groups are Gmsh's physical groups, sets of Abaqus and others, and marks in VTU.
-"""
+"""Mesh files and their groups: Gmsh's 4.1 and Abaqus' by readers of their own, all others by meshio."""
 
 import io
 import re
@@ -71,10 +68,7 @@ def library() -> Any:
 
 
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
-    """Write a mesh atomically as ``.vtu``, with its groups as cell data of zeros and ones.
-
-    Sides become lines and points vertices. `springtune.read_shape` reads them.
-    """
+    """Write a mesh atomically as ``.vtu``, with its groups as cell data; `springtune.read_shape` reads them."""
     if Path(path).suffix != ".vtu":
         raise MeshError(f"{path}: is not to end in '{Path(path).suffix}'; give a name that ends in .vtu")
     check_folder(path)
@@ -310,14 +304,11 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
 
 
 def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
-    """Read a mesh with its groups, of any format that meshio reads.
+    """Read a mesh with its groups, of any format that meshio reads; `unit` is that of coordinates in the file [m].
 
-    Groups are physical groups of Gmsh (by number if unnamed), sets of Abaqus, groups of MED, and
-    named arrays of zeros and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline,
-    make sides; one point makes a point; triangles and quadrilaterals make a part, unless they are all cells.
-
-    `unit` is that of coordinates in the file [m]; `GroupedMesh.unusable` says why groups are not usable. The cells must
-    be a conforming plane sheet.
+    Groups are physical groups of Gmsh (by number if unnamed), sets of Abaqus, groups of MED, and named arrays of zeros
+    and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline, make sides; one point
+    makes a point; triangles and quadrilaterals make a part, unless they are all cells.
     """
     content = _file_content(path)
     mesh, used = _build_mesh(path, content, unit)

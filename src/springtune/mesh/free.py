@@ -14,10 +14,7 @@ EDGE_FACTOR = 1.0 + 1e-9
 
 
 class Triangulation(NamedTuple):
-    """Result of netgen.
-
-    `regions` (n,) are the triangles' domains, from 1 on; `pieces` are line, start and end of each edge on a line.
-    """
+    """Result of netgen: `regions` are domains, from 1 on; `pieces` the line, start and end of each edge on one."""
 
     points: np.ndarray
     triangles: np.ndarray
@@ -36,8 +33,8 @@ def triangulate(
 ) -> Triangulation:
     """Triangulate inside lines, by netgen's advancing front; triangles may be clockwise.
 
-    `lines` are start, end, and the domains on their left and right. Lengths are about 1: netgen's own tolerances are
-    absolute. `sizes` are those of edges at the points, `region_sizes` those in domains.
+    `lines` are start, end, and the domains on their left and right. Lengths must be about 1: netgen's own tolerances
+    are absolute. `sizes` are those of edges at the points, `region_sizes` those in domains.
     """
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException
@@ -69,11 +66,7 @@ def upright(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 @mesh_type("free", order=20, row_height=ROW_HEIGHT)
 def free(length: float, height: float, size: float) -> Mesh:
-    """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
-
-    The sides are divided into equal edges no longer than `size`; inside, netgen makes near-equilateral triangles.
-    Deterministic.
-    """
+    """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front."""
     check_box(length, height, size)
     # Lengths in units of the edge: netgen's own tolerances are absolute.
     size = min(size, max(length, height))  # a side of less than an edge is one edge, and netgen bears no tiny boxes

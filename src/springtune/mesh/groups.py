@@ -172,11 +172,7 @@ class Block(NamedTuple):
 
 @dataclass
 class Content:
-    """Content of a mesh file.
-
-    `cell_groups` are numbers of cells, counted through all blocks, and `point_groups` numbers of points, in one or more
-    arrays; `unusable` are reasons why other groups of the file are left out.
-    """
+    """Content of a mesh file: numbers of cells, over all blocks, and of points, by group; `unusable` are reasons."""
 
     points: np.ndarray
     cells: list[Block]

@@ -52,13 +52,10 @@ class _Stretch:
 
 
 def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
-    """Mesh a shape.
+    """Mesh a shape by netgen; lengths in m. Same input, same mesh.
 
-    Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn with
-    particles on the arc; edges are divided further near much shorter ones. Named points are particles. Inside, netgen
-    makes near-equilateral triangles. Same input, same mesh.
-
-    Lengths are in m. `refined` has shorter edges at named groups, which grow from there.
+    Each side is divided into equal edges no longer than `size`, an arc into at least six a full turn; edges are divided
+    further near much shorter ones. Named points are particles. `refined` has shorter edges at groups.
     """
     what = f"shape '{shape.name}'"
     if not shape.rounds:

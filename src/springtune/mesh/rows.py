@@ -17,8 +17,7 @@ ROW_HEIGHT = math.sqrt(3) / 2
 def structured(length: float, height: float, size: float) -> Mesh:
     r"""Rows of near-equilateral triangles along x, fitted to the box.
 
-    The numbers of cells and rows are nearest to the exact lattice, then stretched to fit; lengths in m. Every other
-    line of points is shifted by half a cell and closed with a point on either end::
+    Every other line of points is shifted by half a cell and closed with a point on either end::
 
         +---+---+---+      4 points, as the lowest line
         |\ / \ / \ /|
@@ -32,9 +31,8 @@ def structured(length: float, height: float, size: float) -> Mesh:
 def isosceles(length: float, height: float, size: float, poisson_ratio: float) -> Mesh:
     """Rows of isosceles triangles whose shape sets Poisson's ratio under load along x.
 
-    Only the row springs carry a uniaxial load along the rows, so ``nu = (a / 2h)^2`` whatever their stiffness: rows
-    of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper. `size` is a [m]; the number
-    of rows is the nearest, that of cells along x keeps the shape best.
+    Only the row springs carry this load, so ``nu = (a / 2h)^2`` with edges a = `size` and rows of height h, whatever
+    the stiffness. An anisotropic mesh, as in figure 4b of the paper.
     """
     check_box(length, height, size)
     if not (isinstance(poisson_ratio, Real) and 1e-6 <= poisson_ratio <= 1):
@@ -70,11 +68,9 @@ def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
 
 
 def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None = None) -> Mesh:
-    """Exact lattice with staggered ends: every particle inside has the same neighbours.
+    """Exact lattice with staggered ends, on which closed forms hold: every particle inside has the same neighbours.
 
-    Closed forms of a lattice are exact on it: lines of points have one length, every other one is shifted by half an
-    edge, and no triangle is cut. `size` is the edge along the rows [m]; `row_height` [m] is by default that of
-    equilateral triangles.
+    `size` is the edge along the rows [m]; `row_height` [m] is by default that of equilateral triangles.
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
     for name, value in (("cells", cells), ("rows", rows)):
@@ -109,14 +105,10 @@ def _joined(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @mesh_type("right", order=30)
 def right(length: float, height: float, size: float) -> Mesh:
-    r"""Squares cut by parallel diagonals.
-
-    Their edges have about `size` [m]; they are stretched to fit the box.
+    """Squares cut by parallel diagonals.
 
     ::
 
-        +---+---+
-        | / | / |
         +---+---+
         | / | / |
         +---+---+
@@ -135,7 +127,6 @@ def alternating(length: float, height: float, size: float) -> Mesh:
         | \ | / |
         +---+---+
         | / | \ |
-        +---+---+
     """
     points, a, b, c, d = _grid(length, height, size)
     columns, rows = nearest_counts(length, height, size)
@@ -147,13 +138,9 @@ def alternating(length: float, height: float, size: float) -> Mesh:
 
 @mesh_type("braced", order=50, corners=4)
 def braced(length: float, height: float, size: float) -> Mesh:
-    r"""Squares with both diagonals.
+    """Squares with both diagonals.
 
-    ::
-
-        +---+---+
-        | X | X |     the diagonals of a square do not meet: there is no particle between them
-        +---+---+
+    The diagonals of a square do not meet: there is no particle between them.
     """
     points, *corners = _grid(length, height, size)
     return Mesh(points, no_cells(3), np.stack(corners, axis=1))

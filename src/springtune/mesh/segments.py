@@ -9,10 +9,7 @@ MOST_PAIRS = 4_000_000
 
 
 def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return pairs of disjoint edges nearer than their reaches together, and their distances [m].
-
-    `points` (n_points, 2) [m], `edges` (n, 2), `reach` (n,) [m].
-    """
+    """Return pairs of disjoint edges nearer than their reaches (n,) together [m], and their distances [m]."""
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     # Along a direction in which few sides of shapes run, an edge overlaps few others.
     along = np.stack([start, end]) @ np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])

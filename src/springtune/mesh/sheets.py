@@ -17,8 +17,8 @@ MOST_SEARCHED_ENDS = 2000
 def sheet_fault(mesh: Mesh) -> str:
     """Return why the cells of a mesh are not a conforming plane sheet, with the remedy, or an empty string.
 
-    Cells must be convex and meet in entire edges, at most two in each, without overlaps. Rounds of the outline must
-    not touch themselves or each other: no slits, hanging points, or cells that meet only in a point.
+    Cells must be convex and meet in entire edges, at most two in each. Rounds of the outline must not touch themselves
+    or each other: no slits, hanging points, or cells that meet only in a point.
     """
     fault = convexity_fault(mesh)
     if fault:
@@ -138,14 +138,8 @@ def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
 def box_fault(mesh: Mesh) -> str:
     """Return why a mesh does not fill its bounding box exactly once, with the remedy, or an empty string.
 
-    Examples
-    --------
-    A box without one of its cells:
-
     >>> from springtune.mesh import Mesh, right
     >>> whole = right(0.1, 0.02, 5e-3)
-    >>> box_fault(whole)
-    ''
     >>> box_fault(Mesh(whole.points, whole.triangles[1:]))[:43]
     'its cells cover 99.375 % of the box or over'
     """
@@ -163,10 +157,7 @@ def box_fault(mesh: Mesh) -> str:
 
 
 def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:
-    """Return why a mesh does not fill a box exactly once, with the remedy, or an empty string.
-
-    A conforming plane sheet whose outline is on the sides of the box has no slits, holes or overlaps of any width.
-    """
+    """Return why a mesh does not fill a box exactly once, without slits or holes, or an empty string."""
     share = mesh.area / box.prod()
     lead = (
         f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > COORDINATE_TOLERANCE else ""
@@ -185,8 +176,6 @@ def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:
 def connected(edges: np.ndarray, count: int) -> np.ndarray:
     """Return the number of each of `count` points' connected part; `edges` has shape (n_edges, 2).
 
-    Examples
-    --------
     >>> connected(np.array([[0, 2], [3, 1]]), 5).tolist()
     [0, 1, 0, 1, 2]
     """
@@ -202,10 +191,7 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
 
 
 def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
-    """Refuse supports that leave a connected body free to move, unless all its points are held.
-
-    `points` (n_points, 2) [m], `edges` (n_edges, 2), `held` (n_points, 2).
-    """
+    """Refuse supports that leave a connected body free to move, unless all its points are held."""
     components = connected(edges, len(points))
     count = components.max() + 1
     for number in range(count):
@@ -219,12 +205,8 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
 
 
 def free_motion(points: np.ndarray, held: np.ndarray) -> str:
-    """Return a rigid motion that supports leave free, in words, or an empty string.
+    """Return a rigid motion that supports leave free, in words, or an empty string; all arrays are (n_points, 2).
 
-    `points` (n_points, 2) [m], `held` (n_points, 2).
-
-    Examples
-    --------
     >>> free_motion(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[True, True], [False, False]]))
     'turn about (0, 0) mm'
     """
@@ -248,16 +230,7 @@ def free_motion(points: np.ndarray, held: np.ndarray) -> str:
 
 
 def bonded(mesh: Mesh, reach: float) -> Mesh:
-    """Return a mesh with a bond between all points up to `reach` apart [m], but for those across its outline.
-
-    Second neighbours on rows of triangles:
-
-    >>> import springtune as st
-    >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "structured", "5 mm")
-    >>> joined = bonded(mesh, 2 * mesh.edge_lengths.max())
-    >>> len(mesh.edges), len(joined.edges), bool(joined.on_outline.sum() == mesh.on_outline.sum())
-    (333, 900, True)
-    """
+    """Return a mesh with a bond between all points up to `reach` apart [m], but for those across its outline."""
     from scipy.spatial import cKDTree  # here, since studies are read without scipy
 
     pairs = cKDTree(mesh.points).query_pairs(reach * (1 + 1e-9), output_type="ndarray")

@@ -26,18 +26,7 @@ CHORD_ERROR = 1e-6
 class OutlineSide:
     """Side of an outline: straight, or an arc of less than half a turn; ends in m.
 
-    Parameters run from 0 to 1, by angle along an arc (the eccentric angle of an ellipse). The body is on the left of
-    a counter-clockwise outline.
-
-    Examples
-    --------
-    A quarter of a circle and one of an ellipse:
-
-    >>> quarter = OutlineSide((1.0, 0.0), (0.0, 1.0), centre=(0.0, 0.0))
-    >>> print(f"{quarter.length:.6f}", "({:.6f}, {:.6f})".format(*quarter.at(0.5)))
-    1.570796 (0.707107, 0.707107)
-    >>> print(f"{OutlineSide((2.0, 0.0), (0.0, 1.0), centre=(0.0, 0.0)).length:.6f}")
-    2.422112
+    Parameters run from 0 to 1, by angle along an arc (the eccentric angle of an ellipse). The body is on the left.
     """
 
     start: Point
@@ -208,10 +197,9 @@ class OutlineSide:
 
 @dataclass(frozen=True)
 class Round:
-    """Closed counter-clockwise round of sides.
+    """Closed counter-clockwise round of sides; `around` is the round whose inside is on its right, or None.
 
-    `inner` and `outer` are the parts on its left and right, None outside the body. `around` is the number of the
-    round whose inside is on the right, or None.
+    `inner` and `outer` are the parts on its left and right, None outside the body.
     """
 
     sides: tuple[OutlineSide, ...]
@@ -244,10 +232,7 @@ def extent(sides: Sequence[OutlineSide]) -> tuple[Point, Point]:
 
 @lru_cache(maxsize=256)
 def polygon(sides: tuple[OutlineSide, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return points along a round (n, 2) [m], and the number of the side that begins or goes on at each.
-
-    The polygon through them is within `CHORD_ERROR` of the round.
-    """
+    """Return points (n, 2) [m] within `CHORD_ERROR` of a round, and the side that begins or goes on at each."""
     error = CHORD_ERROR * math.dist(*extent(sides))
     points, numbers = [], []
     for number, side in enumerate(sides):

@@ -47,12 +47,8 @@ def nearest_whole(ratio: float) -> int:
 
 
 def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
-    """Return the numbers of cells along a box and of rows over its height nearest to a size; lengths in m.
+    """Return the numbers of cells along a box and of rows nearest to a size; `row_height` is over an edge's length [1].
 
-    `row_height` is over the length of an edge [1].
-
-    Examples
-    --------
     >>> nearest_counts(0.2, 0.04, 0.011)
     (18, 4)
     """
@@ -65,10 +61,7 @@ Function = TypeVar("Function", bound=Callable[..., Mesh])
 
 @dataclass(frozen=True, eq=False)
 class MeshType(Declaration):
-    """A mesh type of studies, made by the decorator `mesh_type`; call it to make a mesh.
-
-    `function` takes (length, height, size) [m]. `row_height` is over the mesh size [1].
-    """
+    """A mesh type of studies, made by the decorator `mesh_type`; call it to make a mesh."""
 
     corners: int = 3
     row_height: float = 1.0

@@ -1,8 +1,7 @@
 """Definitions and stiffnesses to use on a mesh, with their errors, solved in linear kinematics.
 
-All registered definitions that suit the mesh and the materials are solved on the mesh itself under some loads and
-compared with the converged reference of small strain. The best ones are kept, of all and of springs alone. A patch test
-between rollers measures Young's modulus and Poisson's ratio of the network.
+All definitions that suit the mesh and the materials are solved and compared with the reference of small strain; the
+best are kept, of all and of springs alone. A patch test between rollers measures the network's moduli.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -409,8 +408,8 @@ def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], a
 class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
-    `names` are the definitions, `same` has for each one with springs the first one with the same springs, `failures`
-    are as of `Choice`. `among` replaces the definitions that suit the mesh, `also` adds some.
+    `same` has for each definition with springs the first one with the same springs. `among` replaces the definitions
+    that suit the mesh, `also` adds some.
     """
 
     def __init__(

@@ -1,10 +1,8 @@
 """Search for the coarsest mesh of each type that keeps an error, by solving.
 
-Errors do not fall evenly with the mesh size: the error of one load may pass through zero, and whole numbers of cells
-stretch a mesh now more, now less. So one mesh that keeps the error proves nothing. A mesh counts if a definition
-keeps the error on it and on all finer meshes tried, at least two, up to one with twice as many cells across the beam.
-The last change over a doubling of the cells may happen once more, so that the error is not just passing zero. Finer
-meshes have whole numbers of cells across, and some sizes between, whose cells are stretched to fit.
+The error of one load may pass through zero, and whole numbers of cells stretch a mesh now more, now less. So a mesh
+counts if a definition keeps the error on it and on all finer meshes tried, at least two, up to one with twice as many
+cells across the beam, with a margin: the last change over a doubling may happen once more.
 """
 
 import logging
@@ -537,10 +535,7 @@ class _Search:
         return [one for one in self.solved if one.cells == int(one.cells) and name in one.errors]
 
     def _promising(self, name: str) -> bool:
-        """Whether a definition may keep the error on the finest mesh, by its last errors.
-
-        An error in proportion to the mesh size changes from n cells to m by 1 - n/m of its change from n/2 to n.
-        """
+        """Whether a definition may keep the error on the finest mesh, if the error is proportional to the mesh size."""
         on = self._on(name)
         doubling = self._doubling(name)
         if doubling is None or FINEST_CELLS_RATIO * REGULAR_FROM_CELLS > on[-1].cells:

@@ -1,7 +1,6 @@
 """Supports, forces and measured quantities of load cases on a mesh, and their checks.
 
-Groups become held directions, prescribed displacements, forces, and weights of displacements or reactions. Beams are
-the special case whose groups are the sides of their box. Held directions and weights have shape (n_points, 2).
+Held directions and weights have shape (n_points, 2). A beam's groups are the sides of its box.
 """
 
 from collections.abc import Iterable, Mapping
@@ -47,18 +46,12 @@ def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 
 
 def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
-    """Return the load pattern: each particle's weight in an even distribution over the loaded side.
-
-    Sum 1 along the force, zero across.
-    """
+    """Return each particle's weight in an even load over the loaded side: sum 1 along the force, zero across."""
     return even(box(mesh, [kind.loaded]), kind.loaded.name, kind.axis)
 
 
 def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
-    """Return the weights, sum 1, of the displacements that make the displacement of a load.
-
-    The mean over the loaded side; for pressure its middle, interpolated along its edge.
-    """
+    """Return the weights of a load's displacement, sum 1: the loaded side's mean, or under pressure its middle."""
     return displacement_weights(loaded_box(mesh, kind), kind.case.quantities[0])
 
 
@@ -94,10 +87,7 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
 
 
 def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
-    """Return the weights of an even distribution over a group, by length; sum 1 along `axis`, zero across.
-
-    Each edge gives half of its share to either particle.
-    """
+    """Return the weights of an even distribution over a group, by length; sum 1 along `axis`, zero across."""
     field = np.zeros(grouped.mesh.points.shape)
     field[:, axis] = _lengths(grouped, group)
     return field / field.sum()
@@ -110,10 +100,7 @@ def forces(
     densities: Mapping[str, float | None] | None = None,
     followers: bool = True,
 ) -> np.ndarray:
-    """Return the forces of a load case on the particles at rest [N], shape (n_points, 2).
-
-    `thickness` is in m; `densities` [kg/m3] by part, the main one at ``""``, are for gravity.
-    """
+    """Return the forces of a load case on the particles at rest [N]; densities [kg/m3] by part are for gravity."""
     field = np.zeros(grouped.mesh.points.shape)
     for traction in case.tractions:
         for axis, force in enumerate(traction.force):
@@ -141,10 +128,7 @@ def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tu
 
 
 def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
-    """Return lumped masses [kg], shape (n_points,): a cell gives equal shares to its corners.
-
-    `thickness` is in m; `densities` [kg/m3] by part, the main one at ``""``.
-    """
+    """Return lumped masses [kg] (n_points,) from densities [kg/m3] by part, the main one at ``""``."""
     points, labels = grouped.mesh.points, part_names(grouped)
     masses = np.zeros(len(points))
     for count, corners in grouped.mesh.cells.items():
@@ -173,8 +157,7 @@ def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray
 def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -> np.ndarray:
     """Return the weights of the support forces that make a reaction.
 
-    A particle that sides of two groups hold in one direction divides its force by their lengths. A point on such
-    sides has no force of its own, as in a continuum.
+    A particle held by two groups divides its force by their lengths; a point on such sides has no force of its own.
     """
     axis = "xy".index(quantity.component)
     holding = [one for one in case.supports if (one.x, one.y)[axis] is not None]
@@ -202,11 +185,7 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
 
 
 def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
-    """Return the cell of a named point and its corners' interpolation weights, sum 1.
-
-    Linear in triangles, bilinear in quadrilaterals; exact at particles and along edges. The nearest cell if a straight
-    edge cuts off the arc that the point is on.
-    """
+    """Return the cell of a named point, or the nearest one, and its corners' interpolation weights, sum 1."""
     mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
     slack, found = POINT_TOLERANCE * np.ptp(mesh.points, axis=0).max(), None
     best = -OUTSIDE_TOLERANCE

@@ -24,36 +24,19 @@ def error_text(error: float) -> str:
 
 
 def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:
-    """Signed deformation error ``(network - reference) / |reference|`` [1].
-
-    Positive means further along +x: too soft in tension, too stiff in compression; see `sign_word`.
-    """
+    """Signed error ``(network - reference) / |reference|`` [1]; positive means further along +x, see `sign_word`."""
     displacement, reference = np.asarray(displacement), np.asarray(reference)
     return (displacement - reference) / np.abs(reference)
 
 
 def sign_word(error: float, reference: float, kind: str = "displacement") -> str:
-    """Word for the sign of an error: "too soft" or "too stiff"; empty where the error or its reference is zero or NaN.
-
-    Of another `kind` of quantity, such as a stress, "too large" or "too small".
-
-    Examples
-    --------
-    >>> sign_word(-0.02, -9.5e-3), sign_word(-0.02, 9.5e-3)
-    ('too soft', 'too stiff')
-    """
+    """Word for the sign of an error, "too soft" or "too large" by `kind` and opposites; empty for zero or NaN."""
     more, less = ("too soft", "too stiff") if kind == "displacement" else ("too large", "too small")
     return more if error * reference > 0 else less if error * reference < 0 else ""
 
 
 def sign_sentence(references: Mapping[str, float], where: str = "under") -> str:
-    """Say once which sign of errors means too soft, for displacements of references by load or by quantity.
-
-    Examples
-    --------
-    >>> sign_sentence({"traction": 1.0, "compression": -1.0})
-    'positive: too soft; under compression, where displacements are negative, negative is too soft'
-    """
+    """Say once which sign of errors means too soft, for displacements of references by load or by quantity."""
     against = [name for name, value in references.items() if value < 0]
     if not against:
         return "positive: too soft"
@@ -64,13 +47,7 @@ def sign_sentence(references: Mapping[str, float], where: str = "under") -> str:
 
 
 def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float]:
-    """Return the `deformation_error` of each quantity of interest; NaN if its reference is missing or zero.
-
-    Examples
-    --------
-    >>> quantity_errors({"end": 1.1, "side": 0.1}, {"end": 1.0, "side": 0.0})["side"]
-    nan
-    """
+    """Return the `deformation_error` of each quantity of interest; NaN if its reference is missing or zero."""
     given = {name: known.get(name) or np.nan for name in values}
     return {name: float(deformation_error(value, given[name])) for name, value in values.items()}
 
@@ -79,8 +56,8 @@ def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> 
 class Best:
     """Stiffness [N/m] at which a sensitivity curve meets the reference, or NaN.
 
-    `status` is solved; unstable if they meet only where the curve is unstable; not converged if they may meet in a
-    gap; failed if they do not meet, or without reference.
+    `status` is solved; unstable if they meet only where the curve is unstable; not converged if they may meet in a gap;
+    failed if they do not meet, or without reference.
     """
 
     stiffness: float
@@ -95,13 +72,10 @@ def best_stiffness(
     reference: float,
     solve: Callable[[float], float],
 ) -> Best:
-    """Find the stiffness at which the stable part of a sensitivity curve meets the reference.
+    """Find the stiffness [N/m] at which the stable part of a sensitivity curve meets the reference.
 
-    Between stable points on either side ``solve(k) = reference`` is solved for ``1/k``, in which the curve is nearly
-    straight. Between the last stable point and the next one, stable points are sought by bisection.
-
-    `stiffness` (n,) is ascending [N/m]; `displacement` (n,) in m, NaN if missing; `solve` returns the stable
-    displacement [m], or NaN.
+    ``solve(k) = reference`` is solved for ``1/k``, in which the curve is nearly straight; `solve` returns the stable
+    displacement [m], or NaN. Stable points beyond the last one are sought by bisection.
     """
     if not np.isfinite(reference):
         return Best(np.nan, Status.FAILED, "the reference has no displacement")
@@ -168,10 +142,9 @@ def _last_root(
 
 
 def assured(errors: np.ndarray) -> np.ndarray:
-    """Largest error of each mesh size and all finer ones that were run [1].
+    """Largest error of each mesh size and all finer ones that were run: a chance crossing of zero promises nothing.
 
-    An error that crosses zero by chance at one size promises nothing: finer sizes show it. `errors` and the result have
-    shape (n_approaches, n_sizes), finest size first. NaN at the finest size, and from where a finer one failed.
+    Arrays are (n_approaches, n_sizes), finest size first. NaN at the finest size, and from where a finer one failed.
     """
     errors = np.abs(errors)
     found = np.full(errors.shape, np.nan)
@@ -190,11 +163,9 @@ def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
 
 
 def band(values: Sequence[float]) -> float:
-    """Return the half-width of the band of a value that scatters from mesh to mesh: twice their largest difference.
+    """Return the half-width of the band of a value that scatters from mesh to mesh: twice its largest difference.
 
-    A laid strip's elongation does not converge in order: a corner catches between two of its particles, which depends
-    on the mesh. Of a few such values the next one often lies beyond their extremes, hence twice. NaN with fewer than
-    two values.
+    Of a few such values the next one often lies beyond their extremes, hence twice. NaN with fewer than two values.
     """
     known = [value for value in values if np.isfinite(value)]
     return 2 * (max(known) - min(known)) if len(known) > 1 else float("nan")

@@ -105,8 +105,6 @@ def beam_label(name: str, length: float, height: float) -> str:
 def size_text(length: float, height: float) -> str:
     """Return extents [m] in words.
 
-    Examples
-    --------
     >>> size_text(0.08, 0.06), size_text(80, 60), size_text(8e-5, 1e-6)
     ('80 x 60 mm', '80 x 60 m', '80 x 1 um')
     """

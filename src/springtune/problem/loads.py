@@ -69,14 +69,6 @@ class LoadKind:
 
     `held` has sides and their held axes: ``(0, 1)`` is a clamp, ``(1,)`` rollers on a horizontal side. `pressed`
     measures the middle of the loaded side instead of its mean.
-
-    Examples
-    --------
-    A plate between two walls, under a pressure:
-
-    >>> built_in = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
-    >>> built_in.symmetric, built_in.clamped
-    (True, False)
     """
 
     name: str
@@ -116,10 +108,7 @@ class LoadKind:
 
     @property
     def mirrored(self) -> bool:
-        """Whether the supports are symmetric about the middle of the loaded side.
-
-        At small strain displacements along the force are then even about this middle, those normal to the force odd.
-        """
+        """Whether the supports are symmetric about the middle of the loaded side."""
         held = {(side, *directions) for side, directions in self.held}
         across = ((side.opposite if side.axis == self.along else side, *axes) for side, axes in self.held)
         return held == set(across)
@@ -162,7 +151,7 @@ FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, BOTH),), pressed=True
 
 @dataclass(frozen=True)
 class Load:
-    """Load of a `kind`; `sign` is 1 where the force acts along its axis, -1 against it. A study gives its size.
+    """Load of a `kind`; `sign` is 1 where the force acts along its axis, -1 against it.
 
     A `follower` force turns and grows with its side in nonlinear kinematics; its kind must be `LoadKind.direct`.
     """

@@ -34,8 +34,6 @@ def shown_order(name: str, value: float) -> float:
 def with_unit(name: str, value: float, digits: int = 4) -> str:
     r"""Return a swept parameter's value with its unit, without line breaks.
 
-    Examples
-    --------
     >>> with_unit("force", 4e5), with_unit("thickness", 2e-3), with_unit("poisson_ratio", 0.3)
     ('400\xa0kN', 'thickness 2\xa0mm', 'nu\xa0=\xa00.3')
     """

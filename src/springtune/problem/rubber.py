@@ -42,11 +42,7 @@ class TestDataError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class TensileTest:
-    """Tensile test of rubber: uniaxial, equibiaxial or in pure shear.
-
-    `stretch` (n,) is length over rest length [1], ascending; `stress` (n,) is force over the cross-section at rest
-    [Pa].
-    """
+    """Tensile test of rubber: ascending stretch [1], and force over the cross-section at rest [Pa], each (n,)."""
 
     stretch: np.ndarray
     stress: np.ndarray

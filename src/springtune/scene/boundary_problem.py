@@ -1,7 +1,4 @@
-"""Boundary-value problems of scenes: a beam under a force, or a shape under a load case.
-
-Each has supports and forces on a mesh, quantities of interest, and the reference.
-"""
+"""Boundary-value problems of scenes: a beam under a force, or a shape under a load case."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -50,8 +47,7 @@ A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
 class BoundaryProblem(ABC):
     """A body under a load: what is held and loaded, what is read, and the reference.
 
-    `force` is the factor of `loading`: the force on a beam with its sign [N], 1 of a shape. `size` is the size of the
-    load: the force [N], or the scale of a load case [1].
+    `force` is the factor of `loading`: a beam's force with its sign [N], or 1. `size` is the force or a case's scale.
     """
 
     body: str

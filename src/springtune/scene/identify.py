@@ -1,8 +1,7 @@
-r"""Constants of a sheet from measured tests, with their uncertainty, and what the tests do not tell.
+"""Constants of a sheet from measured tests, with their uncertainty, and what the tests do not tell.
 
-Least squares of residuals over their noise, with exact derivatives (`springtune.reference.by_constants`). With
-residuals r and derivatives J, both over the noise and without shifts, the covariance of the unknowns is
-:math:`(J^T J)^{-1}`. Along a direction in which J vanishes the tests tell nothing.
+Least squares of residuals over their noise, with exact derivatives J, both without shifts: the covariance of the
+unknowns is :math:`(J^T J)^{-1}`. Along a direction in which J vanishes the tests tell nothing.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -195,10 +194,7 @@ class Model:
     def fit(
         self, constants: dict[str, Any], names: Sequence[str]
     ) -> tuple[dict[str, Any], list[np.ndarray], np.ndarray, np.ndarray]:
-        """Fit named constants; return all, `residuals`, the noise of each block, and halves of 95 % intervals of steps.
-
-        Noise is estimated from the residuals of each block. Intervals are by Student's t.
-        """
+        """Fit named constants; return all, `residuals`, noise by block, and halves of 95 % intervals (Student's t)."""
         noise = self.sizes
         freedom = self.counts * max(1 - len(names) / self.counts.sum(), LEAST_NOISE)
         # Moduli stay within factors of exp(30), even where forces and displacements contradict each other.

@@ -1,8 +1,7 @@
 """Measured tests of sheets: forces with displacements, or displacements of points, from CSV files.
 
-A field has the columns x, y, u and v: where points are at rest, and their displacements, as digital image correlation
-gives them; its other columns are ignored. A curve has the columns ``force`` and ``displacement``, and may have others.
-Units stand in the heads, as in ``force [N],displacement [mm]``.
+A field has the columns x, y, u and v, places at rest and displacements; a curve ``force`` and ``displacement``. Others
+are ignored. Units stand in the heads, as in ``force [N],displacement [mm]``.
 """
 
 import math
@@ -42,11 +41,9 @@ MOST_DISTANCE_FROM_BODY = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Numbers of one kind from one file.
+    """Numbers of one kind from one file: `values` (n,) are `factors` times what `rows` read of the displacements.
 
-    `values` (n,) are `factors` (n,) times what `rows` read of the displacements, one for all or one each. What the
-    columns of `shifts` (n, n_shifts), an orthonormal basis, explain tells nothing of the material. `places` are loads,
-    or points (n / 2, 2).
+    What `shifts` (n, n_shifts), an orthonormal basis, explain tells nothing of the material. `places`: loads or points.
     """
 
     label: str

@@ -75,8 +75,8 @@ def naming_errors(definition: Definition) -> Iterator[None]:
 class Loading:
     """Supports and forces of a load of factor 1 on a mesh; arrays have shape (n_points, 2).
 
-    `held` directions are fixed or moved by `given` [m]. `pattern` are the forces at rest [N], of which `dead` keep
-    their direction and `follower` turns with its sides; `dead` is None where the pattern is all of one sort.
+    `held` directions are fixed or moved by `given` [m]. Of the forces `pattern` [N] `dead` keep their direction (None:
+    all or none do), and `follower` turns with its sides.
     """
 
     key: tuple[object, ...]
@@ -97,8 +97,7 @@ def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
 class Solution:
     """An equilibrium of a network, judged: NaN without one.
 
-    `load` is the factor of the loading over the reference stiffness, `displacement` that of the load [m] or the first
-    quantity of a load case, `negative_pivots` the number of negative eigenvalues of the tangent.
+    `load` is the loading's factor over the reference stiffness, `displacement` the load's [m] or the first quantity.
     """
 
     problem: StaticProblem
@@ -123,10 +122,8 @@ def solve_and_judge(
 class MeshCache:
     """Cache of a meshed sheet of a thickness [m], on which scenes are solved.
 
-    Networks that differ in their reference stiffness alone are assembled and factorized once, `networks` of them are
-    kept; networks with the same directions held share their numbering of unknowns; the springs derived last are kept
-    for further loads. `weights`, `measured`, `loading` and `loaded` are those of `springtune.problem.boundary` by kind
-    of load, `filled` the beams that the mesh is known to fill, `references` those of load cases of a shape.
+    Networks that differ in their reference stiffness alone are assembled and factorized once, the last `networks` are
+    kept, and so are the springs derived last. `filled` are beams that the mesh is known to fill.
     """
 
     def __init__(
@@ -154,10 +151,10 @@ class MeshCache:
         case: tuple[LoadKind | Loading, float, np.ndarray | None] | None = None,
         grouped: GroupedMesh | None = None,
     ) -> tuple[Springs, float]:
-        """Derive the springs of a definition; return them and the seconds that this took. The last ones are kept.
+        """Derive the springs of a definition; return them and the seconds that this took.
 
-        A mapping has the materials by part of `grouped`. `case`, for definitions that are fitted to cases, is the load,
-        its factor and the wanted displacements for a factor of 1, or None without; by default even tension and shear.
+        `case`, for definitions that are fitted to cases, is the load, its factor and the wanted displacements for a
+        factor of 1, or None without; by default even tension and shear.
         """
         definition = definition_of(definition)
         by_part = material if isinstance(material, Mapping) else {"": material}
@@ -188,10 +185,7 @@ class MeshCache:
         return self._derived[1], self._derived[2]
 
     def typical_stiffness(self, springs: Springs) -> dict[str, float]:
-        """Stiffness of springs at rest [N/m]: medians inside and on the outline, the least and the most.
-
-        A median of no springs is NaN. The last ones are kept over the reference stiffness.
-        """
+        """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
         sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
         if self._typical is None or self._typical[0] is not sizes:
             outline = self.mesh.on_outline

@@ -25,10 +25,7 @@ def motion_of(
 def stable_steps(
     sheet: MeshCache, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
 ) -> dict[str, float] | str:
-    """Largest stable steps [s] about rest, undamped, by integrator, infinite if any step is stable; or why not found.
-
-    `inertia` (n_points,) are masses in kg; `held` (n_points, 2) are directions that are held, none by default.
-    """
+    """Largest stable steps [s] about rest, undamped, by integrator, or why not found; `inertia` is in kg."""
     if held is None:
         free = np.zeros(sheet.mesh.points.shape, dtype=bool)
         network = Network(sheet.mesh, free, springs.relative, springs.energies)

@@ -1,7 +1,6 @@
 """Residuals of tests: which values are no measurements, and whether the others are random.
 
-Arrays: values (n_places, n_components), columns (n_places, n_components, n), places (n_places,) of curves and
-(n_places, 2) of fields.
+Arrays: values (n_places, n_components), columns (n_places, n_components, n), places (n_places,) or (n_places, 2).
 """
 
 import numpy as np
@@ -21,10 +20,7 @@ CORRELATION_DEVIATIONS = 2.75
 
 
 def find_measurements(values: np.ndarray, columns: np.ndarray, places: np.ndarray, floor: float) -> np.ndarray:
-    """Return which places (n,) are measurements: others repeat a value that does not fit, or are far from all near.
-
-    What is measured is a combination of `columns`, fitted to least magnitudes, within some noise above `floor`.
-    """
+    """Return which places are measurements: others repeat a value that does not fit, or are far from all near."""
     count = len(places)
     if count < FEWEST_POINTS:
         return np.ones(count, bool)
