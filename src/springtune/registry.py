@@ -1,8 +1,7 @@
 """Registries of definitions, engines, loads and mesh types, and imports by name.
 
-A decorator adds a function to a mapping, which imports the modules of its package on first use. Other packages add
-entries by entry points of the groups ``springtune.definitions``, ``springtune.engines``, ``springtune.loads`` and
-``springtune.mesh_types``.
+A decorator adds a function; the modules of its package are imported on first use. Other packages have entry points in
+``springtune.definitions``, ``springtune.engines``, ``springtune.loads`` and ``springtune.mesh_types``.
 """
 
 import inspect
@@ -108,8 +107,8 @@ Function = TypeVar("Function", bound=Declaration)
 class ExtensibleMapping(Mapping[str, Entry]):
     """Read-only ordered mapping of the package's entries and of entry points of other packages.
 
-    `adopt` checks an imported object and returns the entry, or raises ValueError. Failures are left out with a
-    `PluginWarning`. `packages` has the distributions of entries of other packages.
+    `adopt` checks an imported object and returns the entry, or raises ValueError: then it is left out with a
+    `PluginWarning`. `packages` has the distributions of others' entries.
     """
 
     def __init__(
@@ -182,10 +181,7 @@ class Registry(ExtensibleMapping[Function]):
         self._complete = False
 
     def declare(self, entry: Function) -> None:
-        """Add an entry; the decorators call it.
-
-        A function declared again from the same place, as in a notebook cell, replaces the former one.
-        """
+        """Add an entry; one declared again from the same place, as in a notebook cell, replaces the former one."""
         if not (isinstance(entry.name, str) and NAME.fullmatch(entry.name)):
             raise ValueError(f"{self._what}: {entry.name!r} cannot name one; {NAME_RULE}")
         if not callable(entry.function):
@@ -219,13 +215,7 @@ class Registry(ExtensibleMapping[Function]):
 
 
 def how_to_install(extra: str) -> str:
-    """Return how to install an extra; no package index has springtune.
-
-    Examples
-    --------
-    >>> print(how_to_install("export"))
-    install the extra, in a clone `pip install '.[export]'`, of a wheel `pip install 'springtune-...whl[export]'`
-    """
+    """Return how to install an extra; no package index has springtune."""
     from importlib.metadata import version
 
     wheel = f"springtune-{version('springtune')}-py3-none-any.whl[{extra}]"

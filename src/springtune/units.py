@@ -1,7 +1,6 @@
 """Quantities with units: "200 mm" to 0.2, "210 GPa" to 210e9.
 
-A table has the usual units; pint has all others, but its import would cost every start a third of a second. A test
-compares the table with pint.
+A table has the usual units; pint has all others, but its import would cost every start a third of a second.
 """
 
 import re
@@ -18,13 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Dimension:
-    """Dimension of a quantity, with its usual units and their size in its SI unit.
-
-    Examples
-    --------
-    >>> QUANTITY_DIMENSIONS["stress"].unit
-    'Pa'
-    """
+    """Dimension of a quantity, with its usual units and their size in its SI unit."""
 
     name: str
     unit: str

@@ -18,13 +18,7 @@ from ..studies.runs.source import is_source_tree
 
 
 def examples(*lines: str) -> str:
-    r"""Epilog of a command with examples.
-
-    Examples
-    --------
-    >>> examples("springtune definitions")
-    '\x08\nExamples:\n  springtune definitions'
-    """
+    """Epilog of a command with examples, which click shows verbatim."""
     folder = "" if is_source_tree(Path()) else "config/"  # where `springtune new` writes
     return "\n".join(["\b", "Examples:", *(f"  {line.replace(folder, '')}" for line in lines)])
 
@@ -69,13 +63,7 @@ OPTIONS = {
 
 
 def name_option(message: str, command: click.Command | None) -> str:
-    """Replace the name of an argument at the begin of a message by the option of a command.
-
-    Examples
-    --------
-    >>> name_option("force: '3 mm' is a length; give a force", main.get_command(None, "springs"))
-    "--force: '3 mm' is a length; give a force"
-    """
+    """Replace the name of an argument at the begin of a message by the option of a command, as ``--force``."""
     if command and (found := ARGUMENT_AT_BEGIN.match(message)):
         option = "--" + OPTIONS.get(found[1], found[1])
         if any(option in one.opts for one in command.params):

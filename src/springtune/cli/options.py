@@ -162,10 +162,7 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
 
 @dataclass(frozen=True)
 class BodyOptions:
-    """Body of the options, its material and load, and the mesh of a type and size [m]; a mesh file has no size.
-
-    `body` is a Beam or a Shape, whose `material` is a mapping of parts; `make` makes a mesh of a type and a size.
-    """
+    """Beam or Shape of the options, its material, or a shape's by part, its load, and a mesh type and size [m]."""
 
     body: Any
     material: Any

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 
 
 class Subject(NamedTuple):
-    """A beam under loads, or a shape under a load case, as a prediction names it.
-
-    `known` are references by load, of a shape by quantity; `compared` the value and kind of those that were found.
-    """
+    """A beam under loads, or a shape under a load case; `known` has references by load or quantity."""
 
     name: str
     made_of: str

@@ -1,9 +1,8 @@
 """Declaration of engines: what they take, what is typed into them, and how they step.
 
-An engine gets a net in SI units, a `Setting` and a damping over mass, and returns a `Session` that advances by frames.
 A frame of `dt` has `substeps` steps of ``h = dt / substeps``, each with `iterations` of the engine's solver. After each
-step velocities go down to their share ``1 / (1 + damping h)``: that brings every engine to rest in the same way, and
-does not move an equilibrium. Forces of the load are dead, and on from the first step.
+step velocities are scaled by ``1 / (1 + damping h)``, which does not move an equilibrium. Forces of the load are dead,
+and on from the first step.
 """
 
 from collections.abc import Callable, Mapping

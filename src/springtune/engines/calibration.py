@@ -1,9 +1,8 @@
 """Calibration of a scene to an engine's setting: the numbers to type so that it moves as the material does.
 
-An engine that does not converge adds to the displacement of springs. In most solvers the displacement is nearly
-``a / s + b`` with a factor ``s`` on all that is typed. ``b`` is what iterations and substeps leave, however stiff the
-springs are: a factor hides it for one load and not for the others, and where ``b`` exceeds the material's displacement
-no factor does.
+In most solvers the displacement is nearly ``a / s + b`` with a factor ``s`` on all that is typed. ``b`` is what
+iterations and substeps leave, however stiff the springs are: a factor hides it for one load and not for the others, and
+where ``b`` exceeds the material's displacement no factor does.
 """
 
 import logging
@@ -490,10 +489,7 @@ def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
 
 
 def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
-    """Two factors with the right one between them; NaN for the second where there is none, and one that diverged.
-
-    A factor that diverges in search of a stiffer one, as in explicit steps, is retried nearer.
-    """
+    """Two factors with the right one between them, NaN for the second without one, and one that diverged."""
     stiffen = runs.ratio(1.0, setting) > 1
     first, diverged, step = 1.0, np.nan, BRACKET_RATIO if stiffen else 1 / BRACKET_RATIO
     for _ in range(MOST_BRACKETS):
@@ -512,10 +508,7 @@ def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
 
 
 def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
-    """Double substeps or iterations until the solver error is small without a factor, or stalls.
-
-    Substeps are first set to `FAR_STEPS` stable steps if the error is large.
-    """
+    """Double substeps or iterations until the solver error is small without a factor, or stalls."""
     errors: list[float] = []
     first, tried, found = getattr(setting, raised), runs[1.0, setting], False
     if raised == "substeps" and not abs(tried.solver_error) <= FAR_ERROR:

@@ -1,12 +1,8 @@
 """Implicit Euler, linearised once a step: Baraff and Witkin, Large steps in cloth simulation, SIGGRAPH 1998.
 
-A step solves ``(M + h^2 K) dv = h (f - h K v)`` with the tangent K of where it begins, by some iterations of conjugate
-gradients from ``dv = 0``: SOFA's EulerImplicitSolver with its CGLinearSolver, whose default is 25 iterations. It is our
-integrator ``backward-euler``, so it has every energy of a net. At rest the right-hand side is the unbalanced force, and
-``dv = 0`` is an answer only where there is none: it rests in our equilibrium at any number of iterations. Too few make
-it slow, or it does not come to rest at all.
-
-In single precision the state, the matrix and conjugate gradients are rounded; forces are computed in double.
+A step solves ``(M + h^2 K) dv = h (f - h K v)`` by some iterations of conjugate gradients from ``dv = 0``, as SOFA's
+EulerImplicitSolver with its CGLinearSolver, whose default is 25. It rests in our equilibrium at any number of
+iterations; too few make it slow, or it does not come to rest. In single precision forces are still computed in double.
 """
 
 import numpy as np

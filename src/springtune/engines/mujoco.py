@@ -1,9 +1,8 @@
 """MuJoCo: springs as tendons, triangles of a material as a flex; one engine for each integrator.
 
 `Euler`, `implicitfast` and `RK4` need steps below the stable one. `discrete`, since MuJoCo 3.13, is implicit in
-springs, too, by one linear system a step: `iterations` are those of its conjugate gradients, by default 100. The others
-do not iterate without contacts. MuJoCo computes in double precision. Velocities are scaled after each step, so joints
-have no damping. A state that diverges is put back to the beginning by default; that is turned off here.
+springs, too: `iterations` are those of its conjugate gradients, by default 100. MuJoCo computes in double precision.
+Its reset of states that diverge is turned off.
 """
 
 from collections.abc import Iterator

@@ -1,18 +1,17 @@
 """Newton (newton-physics) on the processor: springs, and triangles of a material, in its solvers VBD and XPBD.
 
 Formulas are from the kernels of Newton 1.8; mu and lambda are Lame's constants of plane stress, h is the thickness.
-XPBD corrects all springs at once and diverges above the largest step of explicit schemes, at any number of iterations.
-It has no triangles, and ignores springs of negative stiffness. Triangles of VBD have the law
+XPBD corrects all springs at once and diverges above the largest step of explicit schemes. It has no triangles, and
+ignores springs of negative stiffness. Triangles of VBD have the law
 
     W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2],  tri_ke = mu h,  tri_ka = lambda h.
 
 At a strain e, displacements differ by some 2 e from those by St. Venant-Kirchhoff's law, which `delingette` has.
 
 Newton's defaults differ in gravity, ground, radius of particles, damping (``tri_kd`` is 10) and the limit of
-velocities. VBD has the colours of `ModelBuilder.color`, which does not see springs; for these it gets our own.
-Positions are absolute and of single precision, so nets are centred at zero: VBD's slender bending is 2e-4 off then,
-else 6e-3. Newton holds particles as a whole: a direction held singly is put back after each step, and the force that
-would have kept it there is added to the next step.
+velocities. `ModelBuilder.color` does not see springs, so VBD gets our own colours. Positions are of single precision,
+so nets are centred at zero: VBD's slender bending is 2e-4 off then, else 6e-3. Newton holds particles as a whole: a
+direction held singly is put back after each step, with the force that would have kept it there in the next.
 """
 
 from collections.abc import Iterator

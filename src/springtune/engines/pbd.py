@@ -1,13 +1,11 @@
 """Position-based dynamics: Mueller, Heidelberger, Hennix and Ratcliff, J. Vis. Commun. Image R. 18, 2007.
 
-A warning rather than a tool: its stiffness s is the share of a spring's stretch that an iteration takes away, between 0
-and 1. One spring that holds a force, with w the sum of its ends' inverse masses, n iterations and steps of h, rests as
-if it had
+A warning rather than a tool: its stiffness s is the share of a spring's stretch that an iteration takes away. One
+spring, with w the sum of its ends' inverse masses, n iterations and steps of h, rests as if it had
 
-    k = ((1 - s)^-n - 1) / (w h^2)    [N/m], so    s = 1 - (1 + k w h^2)^(-1/n),
+    k = ((1 - s)^-n - 1) / (w h^2)    [N/m], so    s = 1 - (1 + k w h^2)^(-1/n).
 
-which is another s for each setting and spring. A net of springs then tends to our equilibrium as h shrinks: the error
-falls as h^2, at any n. It does not as n grows, since iterations know of no load: with A = M^-1 times the tangent of
+A net of springs then tends to our equilibrium as h^2, at any n, but not as n grows: with A = M^-1 times the tangent of
 springs of ``ln(1 + k w h^2) / w``, a linear net rests where ``(exp(A) - 1) u = h^2 M^-1 f``.
 """
 

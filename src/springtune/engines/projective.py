@@ -1,11 +1,9 @@
 """Projective dynamics: Liu, Bargteil, O'Brien and Kavan, Fast simulation of mass-spring systems, ACM TOG 32(6), 2013.
 
-An iteration has a local step, which turns each spring of rest length into its direction, and a global one, a linear
-system ``M / h^2 + L`` that is factorized once. L is the Laplacian of the stiffnesses: it resists as much across a
-spring as along it. Both steps together are ``x - (M / h^2 + L)^-1 g`` with g the gradient of the step's energy (Liu,
-Bouaziz and Kavan, Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017), which
-is how they are taken here. They begin at the inertial position. The energy falls in each iteration, fast where springs
-are stretched and slowly where they turn, as in bending.
+An iteration turns each spring of rest length into its direction, and solves a linear system ``M / h^2 + L``, factorized
+once, with the Laplacian L of the stiffnesses. Both together are ``x - (M / h^2 + L)^-1 g`` with g the gradient of the
+step's energy (Liu, Bouaziz and Kavan, Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG
+36(3), 2017). The energy falls fast where springs are stretched and slowly where they turn, as in bending.
 """
 
 import numpy as np

@@ -61,10 +61,6 @@ MOST_CHANGE_RATIO = 0.99
 def off_text(error: float, reference: float = 0.0) -> str:
     """Error of a displacement in words: "diverged" without one, and times instead of percents where it is large.
 
-    Without a `reference` [m] an error of any sign is too far.
-
-    Examples
-    --------
     >>> off_text(0.02, 1e-3), off_text(-10.0, -1e-3), off_text(float("nan"), 1e-3)
     ('+2.00 %', '11 times too far', 'diverged')
     """
@@ -376,11 +372,7 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
-    """Advance a session until it rests.
-
-    Where the changes in windows of frames shrink by a ratio r, the rest of the way is the last change times r / (1 -
-    r). A run rests where this stays below `tolerance` of the displacement, or where it oscillates by less.
-    """
+    """Advance a session until it rests: what is left of the way, by the last changes, is below `tolerance`."""
     seen: list[np.ndarray] = []
     seconds: list[float] = []  # a frame, without the first one, which may compile
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0

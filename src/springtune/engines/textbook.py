@@ -1,8 +1,7 @@
 """Base of the textbook solvers: a step from the inertial position, and the velocity after it.
 
 A step minimises ``|x - y|^2 / (2 h^2) + W(x)``, the first term weighted by masses, about ``y = x + h v + h^2 f / m``. A
-solver that begins at y and stops early ends between y and the minimum. So it rests where each step falls back by
-``h^2 f / m``: too far along the load, as if springs were softer.
+solver that begins at y and stops early rests too far along the load, as if springs were softer.
 """
 
 import numpy as np
@@ -49,10 +48,9 @@ def project_springs(x, weights, springs, lengths, shares, compliance, multiplier
 
 
 class Textbook:
-    """Session of implicit Euler steps ``M (x - y) / h^2 + dW/dx = 0``, solved as `solve` of a subclass does.
+    """Session of implicit Euler steps ``M (x - y) / h^2 + dW/dx = 0`` from ``y = x + h v + h^2 f / m``.
 
-    ``y = x + h v + h^2 f / m`` is the inertial position. All arrays are of the setting's precision: `points`, `x`, `v`
-    and `forces` (n_points, 2), `weights` (n_points, 2), the inverse masses, 0 where a direction is held.
+    All arrays are (n_points, 2), of the setting's precision; `weights` are inverse masses, 0 where held.
     """
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:

@@ -1,16 +1,13 @@
 """Vertex block descent: Chen, Liu, Yang and Yuksel, ACM TOG 43(4), 2024.
 
-An iteration visits the particles one after the other, here in their order. Each takes a step of Newton's method for the
-energy of the implicit Euler step as a function of its own place: a system of two equations. Springs that are pressed
-and triangles that are pressed would make blocks indefinite: what is negative across them is left out of the blocks, and
-stays in the forces. So the answer of many iterations is the same.
+An iteration visits the particles in their order; each takes a step of Newton's method for the implicit Euler step's
+energy. What is negative across pressed springs and triangles is left out of the blocks, and stays in the forces.
 
-What few iterations leave behind depends on where they begin, which no page of an engine says:
+What few iterations leave behind depends on where they begin:
 
 - `vbd-inertia` begins at the inertial position, as Newton's solver does. It rests too far along the load.
-- `vbd` has the adaptive guess of the paper: of the load's acceleration the share that the last step has followed. At
-  rest that is none, so iterations begin where the step began, and stand still only where all forces are balanced: it
-  rests in our equilibrium at any number of iterations. Few iterations only make it come there late.
+- `vbd` has the adaptive guess of the paper: of the load's acceleration the share that the last step has followed. It
+  rests in our equilibrium at any number of iterations; few only make it come there late.
 """
 
 from typing import Any

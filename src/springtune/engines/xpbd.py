@@ -1,12 +1,11 @@
 """Extended position-based dynamics: Macklin, Mueller and Chentanez, XPBD, Motion in Games 2016.
 
-A spring is the constraint ``C = l - L`` with compliance ``1 / k``. An iteration visits the constraints one after the
-other; each changes its multiplier by ``(-C - a lambda) / (sum of w |grad C|^2 + a)`` with ``a = 1 / (k h^2)``.
-Multipliers begin each step at zero. Few iterations of small steps are better than many of large ones (Macklin et al.,
-Small steps in physics simulation, SCA 2019). The method follows later descriptions; these two papers were not read.
+A spring is the constraint ``C = l - L``. An iteration visits one constraint after the other; each changes its
+multiplier, zero as a step begins, by ``(-C - a lambda) / (sum of w |grad C|^2 + a)`` with ``a = 1 / (k h^2)``. Few
+iterations of small steps are better than many of large ones (Macklin et al., Small steps in physics simulation, SCA
+2019). The method follows later descriptions; these two papers were not read.
 
-Areas, squared lengths and rubber are blocks of constraints of a cell, solved at once; `springtune.handover.xpbd` has
-their formulas, which are exact for each energy. The volume of compressible rubber is found before each projection.
+Areas, squared lengths and rubber are blocks of constraints, see `springtune.handover.xpbd`.
 """
 
 from typing import Any

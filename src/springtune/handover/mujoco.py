@@ -1,16 +1,14 @@
 """MuJoCo's models (MJCF): particles on slides, springs as tendons.
 
-Each particle that can move is a body on a slide joint for each direction that is not held, each spring a spatial tendon
-with its stiffness and its rest length, which has our law in tension and in compression. A fixed tendon spreads the
-load, and one actuator is the load: a slider of the viewer changes it. Damping is that of the joints, which MuJoCo's
-integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
+Each particle is a body on a slide joint for each free direction, each spring a spatial tendon with our law. A fixed
+tendon spreads the load, and one actuator is the load: a slider of the viewer changes it. Damping is that of the joints,
+which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`.
 
 Coupled springs of squared lengths (definition `delingette`) are the flex of two dimensions of MuJoCo 4, with
 
     mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2) of plane stress
 
-for the thickness t. In MuJoCo 3 young and poisson mean other constants: it refuses a file with a flex. Bodies of a flex
-may have no damping in their joints, so a fixed tendon for each joint has it.
+for the thickness t. MuJoCo 3 refuses a file with a flex. Its joints have no damping; fixed tendons have it.
 """
 
 from collections.abc import Sequence

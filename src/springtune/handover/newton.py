@@ -1,12 +1,10 @@
-"""Sheets for Newton (newton-physics): a script of its `ModelBuilder`.
+"""Sheets for Newton (newton-physics), read and run with Newton 1.8: a script of its `ModelBuilder`.
 
-Read and run with Newton 1.8. Springs have our law and [N/m]. A triangle of Newton's solver VBD has Lame's constants of
-plane stress times the thickness h [N/m]
+A triangle of Newton's solver VBD has Lame's constants of plane stress times the thickness h [N/m]
 
     tri_ke = mu h = E h / (2 (1 + nu)),    tri_ka = lambda h = E h nu / (1 - nu^2)
 
-and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`. At small strain it is St. Venant-Kirchhoff's, which
-`delingette` is; files have the equilibrium of Newton's law.
+and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`, at small strain that of `delingette`.
 """
 
 import numpy as np

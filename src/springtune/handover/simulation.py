@@ -46,11 +46,9 @@ class EquilibriumWarning(UserWarning):
 class Simulation:
     """Step, damping, frequencies and equilibrium of a net in a simulator.
 
-    `masses` (n_points,) are in kg. `force` is signed [N]; 1 for a load case of a shape, 0 without a load.
-    `largest_step` is stable about rest without damping, `step` also in motion [s]. `frequency` and `loaded_frequency`,
-    which the load excites, are the lowest [rad/s]. `mass_damping` over mass [1/s] is critical for the loaded frequency,
-    or less, so that no mode comes to rest later than the lowest one. `displacements` (n_points, 2) are the stable
-    equilibrium [m], or None.
+    `force` is signed [N]; 1 for a load case, 0 without a load. `largest_step` is stable about rest, `step` also in
+    motion [s]. `frequency` is the lowest, `loaded_frequency` that which the load excites [rad/s]. `mass_damping` over
+    mass [1/s] is critical for the latter, or less, so that no mode comes to rest later than the lowest one.
     """
 
     masses: np.ndarray
@@ -74,8 +72,8 @@ def simulate(
 ) -> Simulation:
     """Masses, damping, step and equilibrium of a net for a simulator, whose own `energies` may stand for the net's.
 
-    Frequencies are at rest; the springs keep their length law. A mode of frequency w under a damping over mass c > 2 w
-    comes to rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
+    A mode of frequency w under a damping over mass c > 2 w comes to rest with the rate c/2 - sqrt(c^2/4 - w^2), which
+    is the lowest frequency w1 for c = w1 + w^2/w1.
     """
     _check(net, program, laws)
     assert net.masses is not None

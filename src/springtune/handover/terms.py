@@ -72,9 +72,8 @@ REST_VALUES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Energies of one kind besides the springs: a row for each cell.
+    """Energies of one kind besides the springs: a row for each of `cells` (n_cells, n_corners), counter-clockwise.
 
-    `cells` (n_cells, n_corners) are particles, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
     `values`, by the names of `VALUES`, have shape (n_cells,) or (n_cells, n_corners). Values of sides are of the side
     opposite to each corner, and `coupling` of the two sides that meet in it.
     """

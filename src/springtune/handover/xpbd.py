@@ -1,17 +1,14 @@
 """Constraints for extended position-based dynamics (XPBD), as JSON.
 
 A spring is the distance constraint ``C = l - L`` with the compliance 1/k [m/N] (Macklin, Mueller, Chentanez, XPBD,
-Motion in Games 2016): where a solver has converged, the constraint pulls with C over its compliance, for any step.
-
-Other energies are blocks of constraints C of a cell with a matrix of compliances A, so that ``W = C A^-1 C / 2`` is the
-energy itself, at any strain: areas, Delingette's squared lengths, and rubber. With F the deformation gradient of a
-triangle and J its area over the one at rest,
+Motion in Games 2016). Other energies are blocks of constraints C of a cell with compliances A and ``W = C A^-1 C / 2``,
+exact at any strain. With F the deformation gradient of a triangle and J its area over the one at rest,
 
     D = tr F^T F - 2 J = (F_xx - F_yy)^2 + (F_xy + F_yx)^2,    2 J + J^-2 - 3 = (J - 1)^2 (2 J + 1) / J^2,
 
-so a neo-Hookean sheet is three constraints that vanish at rest and have one compliance. That is derived here. Macklin
-and Mueller (A constraint-based formulation of stable neo-Hookean materials, Motion, Interaction and Games 2021) take
-tr F^T F and J for constraints; their law is another one, equal to ours at small strain alone.
+so a neo-Hookean sheet is three constraints that vanish at rest and have one compliance; derived here. Macklin and
+Mueller (A constraint-based formulation of stable neo-Hookean materials, Motion, Interaction and Games 2021) have
+another law, equal to ours at small strain alone.
 """
 
 import json

@@ -33,20 +33,9 @@ Compute it again with the packages of `versions.json`:
 
 
 def pack(study: Study, folder: Path, target: Path) -> list[str]:
-    """Write an archive of a finished study, and return the names of its files.
+    """Write a zip archive of a finished study, and return the names of its files.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Its results.
-    target : Path
-        Zip file to write; one that is there is replaced when all is written.
-
-    Raises
-    ------
-    ValueError
-        If the dataset is missing, or of another text of the study.
+    Raises ValueError if the dataset is missing, or of another text of the study.
     """
     from rocrate.rocrate import ROCrate  # here: an extra
 

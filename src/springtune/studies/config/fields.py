@@ -204,8 +204,6 @@ RANGE_DIGITS = 12
 def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
     """Values of a range, with both ends unchanged.
 
-    Examples
-    --------
     >>> spaced(1e-3, 4e-3, 3, "linear"), spaced(1e-3, 4e-3, 3, "logarithmic")
     ([0.001, 0.0025, 0.004], [0.001, 0.002, 0.004])
     """

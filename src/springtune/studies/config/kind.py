@@ -36,10 +36,7 @@ EMPTY_VALUES |= {"int32": np.int32(0), "no node": np.int32(-1)}
 
 
 def declared_variables(module: str, group: str = "", **dimensions: tuple[str, ...]) -> Variables:
-    """Variables by the table beside a module's file, of one of its groups if it has several.
-
-    Its ``dimensions`` are names of dimensions, or of several of them that are given here.
-    """
+    """Variables by the table beside a module's file, of one of its groups; `dimensions` stand for names in it."""
     found = {}
     with Path(module).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
@@ -51,10 +48,7 @@ def declared_variables(module: str, group: str = "", **dimensions: tuple[str, ..
 
 @dataclass(frozen=True)
 class Output:
-    """Figures and tables of a dataset that a study may request under ``outputs``.
-
-    Code is named by text: a module within the package, or ``"module:function"``.
-    """
+    """Figures and tables that a study may request under ``outputs``; code is a module, or ``"module:function"``."""
 
     name: str
     meaning: str  # for the manual
@@ -80,11 +74,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage before the dataset, with a rule of its name; each of its jobs does a bundle of tasks.
-
-    A job needs the job of the same bundle of the stage `like`. All else that it needs is input of its rule in
-    ``workflow/rules/stages.smk``.
-    """
+    """A stage before the dataset, with a rule of its name; a job needs that of the same bundle of the stage `like`."""
 
     name: str
     module: str  # does one task, see `springtune.studies.runs.attempts`
@@ -103,8 +93,7 @@ class StudyKind:
     """A study kind: ``KIND`` in the module ``kind`` of its package, which imports neither scipy, xarray nor matplotlib.
 
     Rows of results become its group of the dataset if it has ``variables``; otherwise ``groups(study, folder)`` of a
-    module ``collect`` returns groups by name. A module ``outputs`` with ``OUTPUTS``, without pydantic, makes drawing
-    faster.
+    module ``collect`` returns groups by name. A module ``outputs`` with ``OUTPUTS`` makes drawing faster.
     """
 
     name: str  # of its package, and of its part of a study

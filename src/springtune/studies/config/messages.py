@@ -97,8 +97,6 @@ def refuse(message: str, *path: Key) -> PydanticCustomError:
 def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
     """Return the part of a path that exists in a content, and the value there; a single value has no items.
 
-    Examples
-    --------
     >>> part_of({"beam": ["a", "b"], "load": "traction"}, ("beam", 1)), part_of({"load": "traction"}, ("load", 0))
     ((('beam', 1), 'b'), (('load',), 'traction'))
     """
@@ -229,8 +227,6 @@ def validated(
 def show(value: object) -> str:
     """Format a value for a message.
 
-    Examples
-    --------
     >>> show("200 mm"), show([]), show({"length": "1 m"})
     ("'200 mm'", 'an empty list', 'a mapping')
     """
@@ -281,13 +277,9 @@ def read_study(path: str | Path) -> tuple[str, Any, Lines]:
 def read_yaml(text: str, file: str) -> tuple[Any, Lines]:
     r"""Content of a YAML text, whose scalars stay texts, and the line of each path of keys.
 
-    Examples
-    --------
     >>> content, lines = read_yaml("title: no\nbeams:\n  small: {length: 50 mm}", "study.yaml")
-    >>> content
-    {'title': 'no', 'beams': {'small': {'length': '50 mm'}}}
-    >>> lines["beams", "small", "length"]
-    3
+    >>> content, lines["beams", "small", "length"]
+    ({'title': 'no', 'beams': {'small': {'length': '50 mm'}}}, 3)
     """
     reader = _Reader(file)
     try:

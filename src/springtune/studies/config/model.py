@@ -130,11 +130,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A study, ready to run.
-
-    Tuples have no duplicates and are ordered by beam and material as declared, then by mesh type, mesh size, load,
-    definition and kinematics.
-    """
+    """A study, ready to run: tuples without duplicates, in the order of beams, materials, mesh types, sizes, loads."""
 
     name: str
     path: Path
@@ -177,8 +173,6 @@ class Study:
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.
 
-        Examples
-        --------
         >>> import springtune as st
         >>> st.load_study("config/shapes.yaml").material("steel").young_modulus
         210000000000.0
@@ -189,10 +183,6 @@ class Study:
 
     def shape(self, name: str) -> Shape:
         """A shape that the study declares, with its loads.
-
-        Examples
-        --------
-        From a study to the error of each definition:
 
         >>> import springtune as st
         >>> study = st.load_study("config/shapes.yaml")
@@ -209,15 +199,7 @@ class Study:
         return found
 
     def materials_of(self, shape: str, material: str) -> dict[str, AnyMaterial]:
-        """Material of each part of a shape, as the study declares it, and that of the main part, ``""``.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> study = st.load_study("config/shapes.yaml")
-        >>> {part: one.name for part, one in study.materials_of("cook", "third").items()}
-        {'': 'third'}
-        """
+        """Material of each part of a shape, as the study declares it, and that of the main part, ``""``."""
         self.shape(shape)
         own = self.shapes.parts[shape]
         return {"": self.material(material)} | {part: self.material(name) for part, name in own.items()}

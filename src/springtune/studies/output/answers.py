@@ -26,10 +26,7 @@ def broadcast(dims: Sequence[str], own: Sequence[str], values: np.ndarray) -> np
 
 
 def requested_cells(group: Variables, finite: Variables | None = None, error: str = "deformation_error") -> Columns:
-    """Requested cells of a group; their `valid_error` is NaN unless they are solved and their reference applies.
-
-    Errors of nonlinear networks are against references at `finite` strain where there are any.
-    """
+    """Requested cells of a group; `valid_error`, at `finite` strain if nonlinear, is NaN where it does not apply."""
     dims, values = group[error]
     there = broadcast(dims, *group["status"]) != Status.NOT_REQUESTED
     places = dict(zip(dims, np.nonzero(np.broadcast_to(there, values.shape))))

@@ -41,10 +41,9 @@ Labels = dict[str, str | float]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Tolerances; either is enough.
+    """Tolerances, either is enough; `relative` refers to the larger number, or the largest of a curve or field.
 
-    `relative` refers to the larger number, or to the largest of a curve or field. `absolute` is in the numbers' unit;
-    None is 0, or `relative` for numbers without unit.
+    `absolute` is in the numbers' unit; None is 0, or `relative` for numbers without unit.
     """
 
     relative: float = RELATIVE_TOLERANCE
@@ -58,10 +57,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Change:
-    """A changed cell, or the most changed point of a curve or field.
-
-    Missing values are NaN or "". `excess` is the difference over the tolerance, infinite without one.
-    """
+    """A changed cell, or a curve's most changed point; `excess` is the difference over the tolerance, or infinite."""
 
     group: str
     variable: str
@@ -148,18 +144,8 @@ def compare(
 ) -> Comparison:
     """Compare two datasets by label; list at most so many changes of each variable.
 
-    Numeric labels match in nine digits; NaN equals NaN. Values of cells that one study does not request
-    are not compared. Numbers inside texts are compared as numbers. `MEASURED_VARIABLES` is left out.
-
-    Examples
-    --------
-    >>> one = xr.DataTree(tree.to_dataset())  # the root alone
-    >>> compare(one, one).different
-    False
-    >>> other = one.copy(deep=True)
-    >>> other["stiffness"][0, 0, 0, 0, 0, 0, 0] *= 2
-    >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(one, other).changes]
-    [('stiffness', '100x20', 2.0)]
+    Numeric labels match in nine digits; NaN equals NaN. Values of cells that one study does not request are not
+    compared. Numbers inside texts are compared as numbers. `MEASURED_VARIABLES` is left out.
     """
     nodes = [{node.path: _rounded(node.to_dataset()) for node in tree.subtree} for tree in (before, after)]
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})

@@ -91,8 +91,7 @@ class Group:
     ) -> xr.Dataset:
         """Create the dataset of rows of labels and values; each value goes to the labels that its variable has.
 
-        An array fills the first places along the dimensions that rows have no labels of. Dimensions without an axis
-        have the labels of the rows, in their order.
+        An array fills the first places along dimensions without labels; ones without an axis take the rows' order.
         """
         frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
         needed = {one for dimensions, *_ in self.variables.values() for one in dimensions} - axes.keys()

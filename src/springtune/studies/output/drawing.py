@@ -35,10 +35,7 @@ NO_RESULT, NOT_ASKED = "×", "–"
 
 @style.styled
 def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, forces: np.ndarray, title: str) -> Axes:
-    """Draw deformed springs coloured by force, and the outline at rest.
-
-    `displacements` has shape (n_points, 2) [m], `forces` (n_edges,) [N].
-    """
+    """Draw deformed springs coloured by force [N], and the outline at rest."""
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.2))
     largest = float(np.abs(forces).max()) or 1.0
     outline = mesh.points[mesh.edges[mesh.on_outline]]
@@ -156,10 +153,7 @@ NETWORK_LINE_WIDTH = 0.35
 def draw_network(
     panel: Axes, fields: "xr.Dataset", scale: float, most: float = 0.0, cmap: Colormap | None = None
 ) -> LineCollection | None:
-    """Draw a deformed network over the outline of its reference in grey, and the outline at rest, dashed.
-
-    Return its lines if they are coloured by their force, up to `most` [N]; None also without displacements.
-    """
+    """Draw a deformed network, coloured up to `most` [N], over the outline of its reference and the one at rest."""
     outline, there = plane_vectors(fields, "outline_{}"), plane_vectors(fields, "reference_displacement_{}")
     rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
     for number in range(int(rounds.max(initial=-1)) + 1):

@@ -16,10 +16,7 @@ ERROR_RANGE = (0.1, 100.0)
 
 
 def sign_of_displacements(references: np.ndarray, axes: Mapping[str, Sequence[object]]) -> str:
-    """Sentence on which sign of errors means too soft, by loads or else quantities; empty without any reference.
-
-    `axes` has the labels of each axis of the displacements of references.
-    """
+    """Sentence on which sign of errors means too soft, by loads or else quantities; empty without any reference."""
     signs = np.sign(references)
     known = signs[np.isfinite(signs) & (signs != 0)]
     if not known.size or (known == known[0]).all():

@@ -34,10 +34,7 @@ class RequestError(ValueError):
 
 
 def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
-    """Return a group as a table: a row for each requested cell, a column for each dimension and variable.
-
-    Flags are words; other values are in SI units, which are in brackets behind the names.
-    """
+    """Return a group as a table: a row for each requested cell, a column for each dimension and variable."""
     name = "/" + group.strip("/")
     known = [node.path for node in tree.subtree]
     if name not in known:

@@ -111,16 +111,7 @@ def dataset_file(path: str | os.PathLike[str]) -> Path:
 
 @contextmanager
 def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Context that turns any error on a damaged dataset into a refusal.
-
-    Examples
-    --------
-    >>> with guarded("dataset.nc"):
-    ...     {}["status"]
-    Traceback (most recent call last):
-    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); delete it, and the
-    same run makes it again
-    """
+    """Context that turns any error on a damaged dataset into a refusal."""
     try:
         yield
     except (AttributeError, ArithmeticError, LookupError, MemoryError, RuntimeError, TypeError) as error:

@@ -55,10 +55,7 @@ def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label 
 
 
 def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray]:
-    """Last swept values of each beam, material and load.
-
-    Figures without a sweep show these: the largest force, then the largest thickness, and so on.
-    """
+    """Last swept values of each beam, material and load: what figures without a sweep show."""
     names = [str(name) for name in present.dims if name in SWEPT and name != along]
     if not names:
         return {}
@@ -138,10 +135,7 @@ def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label
 
 
 def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> list[dict[str, Any]]:
-    """Labels and variables of the present cells, the last dimension of `present` fastest.
-
-    Plain arrays: selecting each cell of a dataset takes a thousand times as long.
-    """
+    """Labels and variables of present cells, last dimension fastest; selecting each takes a thousand times as long."""
     places = dict(zip(map(str, present.dims), np.nonzero(present.values)))
     columns = {name: present[name].values[numbers].tolist() for name, numbers in places.items()}
     for name in names:

@@ -1,7 +1,4 @@
-"""Dataset as text: solved cells, failures with reasons, errors, groups, origin.
-
-The stage `collect` writes `text` beside the dataset; `info` adds what the file is.
-"""
+"""Dataset as text, for `collect` and `info`: solved cells, failures with reasons, errors, groups, origin."""
 
 import os
 from collections.abc import Iterator, Mapping

@@ -35,14 +35,10 @@ def bytes_text(number: float) -> str:
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
     """Label of a dimension for readers.
 
-    Examples
-    --------
     >>> label_text("mesh_size", 0.005, "m"), label_text("load", "shear"), label_text("friction", 0.2)
     ('5 mm', 'shear', 'friction 0.2')
-    >>> label_text("mesh_size", 0.0, "m")
-    'size of the file'
-    >>> label_text("force", 12345.6, "N"), label_text("gap", 0.001, "m")
-    ('12.3456 kN', 'gap 1 mm')
+    >>> label_text("mesh_size", 0.0, "m"), label_text("force", 12345.6, "N")
+    ('size of the file', '12.3456 kN')
     """
     if isinstance(label, str) or not isinstance(label, SupportsFloat):
         return str(label)
@@ -75,13 +71,7 @@ def without_numbers(text: str) -> str:
 
 
 def variable_name(group: str, variable: str) -> str:
-    """Name of a variable with its group; the root's name is left out.
-
-    Examples
-    --------
-    >>> variable_name("/", "force"), variable_name("/sensitivity", "displacement")
-    ('force', 'sensitivity/displacement')
-    """
+    """Name of a variable with its group, as ``sensitivity/displacement``; the root's name is left out."""
     return f"{group.strip('/')}/{variable}".lstrip("/")
 
 
@@ -110,10 +100,7 @@ def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
-    """Decimals that show so many significant digits of a column; None if there would be too many.
-
-    The largest number has all of them, the smallest nonzero one at most one fewer.
-    """
+    """Decimals that show so many significant digits of a column's largest number; None if there would be too many."""
     sizes = [abs(value) for value in values if math.isfinite(value) and value]
     if not sizes:
         return 0

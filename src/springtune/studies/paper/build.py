@@ -1,7 +1,4 @@
-"""Build a paper: numbers, tables, figures, then the PDF.
-
-``figures.yaml`` declares each figure: a plot function with study and selection, or a script of ``examples/``.
-"""
+"""Build a paper: numbers, tables, figures as ``figures.yaml`` declares them, then the PDF."""
 
 import io
 import os
@@ -120,15 +117,6 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
 
     Digits are allowed in names (``2-D``, ``P1``, ``@tab-1``), after *Table*, *Figure*, *Equation* and *section*, and in
     arguments of `FUNCTIONS`. Formulas may hold one-digit integers, as :math:`2 k / \sqrt 3`.
-
-    Examples
-    --------
-    >>> list(typed_numbers("The error is 3.4 %, see Table 1."))
-    [(1, '3.4 %')]
-    >>> list(typed_numbers('The error is #n("worst"), see @tab-1; $k = sqrt(3)/2 E t$ in 2-D.'))
-    []
-    >>> list(typed_numbers("As a formula: $k = 0.866 E t$."))
-    [(1, '0.866 E')]
     """
     for pattern in IGNORED_PATTERNS:
         text = pattern.sub(_blank, text)
@@ -143,10 +131,7 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
 
 
 class Drawing(BaseModel):
-    """Declaration of a figure: a public plot function such as ``plot_sensitivity``, a study and its selection.
-
-    In their place `example` names a script whose ``main`` leaves one figure open.
-    """
+    """Declaration of a figure: a public plot function, a study and its selection, or a script of ``examples/``."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -6,8 +6,6 @@ of a study's dataset at some labels, reduced where that leaves several cells, or
     largest_error:  {study: paper, variable: deformation_error, at: {definition: lattice}, reduce: largest,
                      absolute: true, unit: "%", digits: 2}
     lattice_rule:   {formula: sqrt(3) / 2 * sheet, unit: N/m, digits: 1}
-
-A table is the product of its rows and columns, each a part of such a declaration.
 """
 
 import hashlib
@@ -109,14 +107,12 @@ REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
 
 
 class Number(BaseModel):
-    """Declaration of a number.
+    """Declaration of a number, or of a part of a table's, which is the product of its rows and columns.
 
     `variable` includes its group, as in ``sensitivity/best_stiffness``. `at` maps dimensions to labels; cells of a list
     of such mappings count together. `over` names a divisor of the same group. `where` tests flags: ``status=unstable``,
-    ``status!=not_requested``. `reduce` is of `REDUCTIONS`, and `cells` the number of values that it needs. `formula`
-    computes from other numbers in SI units, in place of a variable. `optional` numbers may be missing. `marks` maps a
-    mark to a variable whose text or status sets it. `title` and `group` belong to tables; ``{beam}`` stands for its
-    label.
+    ``status!=not_requested``. `cells` is the number of values that `reduce` needs. `marks` maps a mark to a variable
+    whose text or status sets it. `title` and `group` belong to tables; ``{beam}`` stands for its label.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -261,10 +257,7 @@ def validated(model: type[Any], entry: object, name: str) -> Any:
 
 
 def _cells(number: Number, datasets: Mapping[str, Dataset], name: str, of_table: bool = False) -> pd.DataFrame:
-    """Cells of a number: ``value``, ``message``, and its marks by name.
-
-    Cells of a table are of labels that their variable may lack.
-    """
+    """Cells of a number: ``value``, ``message``, and its marks by name; of a table, variables may lack labels."""
     if not number.study or not number.variable:
         raise PaperError(f"{name}: give a study and a variable, or a formula")
     one = dataset_of(datasets, number.study, name)

@@ -120,15 +120,7 @@ class Attempts:
 
 
 def failure_reason(error: Exception) -> str:
-    """Return the reason of a failed task, or an empty string if the program is broken.
-
-    Examples
-    --------
-    >>> failure_reason(ZeroDivisionError("division by zero"))
-    'ZeroDivisionError: division by zero'
-    >>> failure_reason(TypeError("unsupported operand"))
-    ''
-    """
+    """Return the reason of a failed task, or an empty string if the program is broken."""
     # By name: results shall not depend on the code of meshes and definitions for the sake of an exception.
     names = {one.__name__ for one in type(error).__mro__}
     if names & {"DefinitionError", "MeshError", "RefusedError"}:

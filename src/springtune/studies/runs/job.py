@@ -1,7 +1,6 @@
 """A job of a stage, ``python -m springtune.studies.runs.job TASKS RECORD DIGEST STUDY``.
 
-The note ``TASKS`` has the module of the stage and its tasks, see `springtune.studies.runs.attempts`. The begin of a run
-writes it; where none does, as in another workflow that uses this one, the job plans the study itself.
+The begin of a run writes the note ``TASKS``, with the stage's module and tasks; without it the job plans the study.
 """
 
 import os

@@ -1,7 +1,6 @@
 """Locks of running studies, and the study that a folder of results belongs to.
 
-Snakemake's locks stay after a kill. A run also locks a note in each study's folder by `flock`, which ends with the
-process; so `springtune run` knows when it can remove Snakemake's lock.
+Snakemake's locks stay after a kill. A run also locks a note in each study's folder by `flock`, which ends with it.
 """
 
 import fcntl

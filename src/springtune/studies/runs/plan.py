@@ -1,7 +1,4 @@
-"""Jobs of a study's stages: tasks bundled into jobs of about equal work, and their stored results.
-
-Expected seconds follow from numbers of particles alone, so that a study has the same jobs on each machine.
-"""
+"""Jobs of a study's stages: tasks in jobs of about equal work by numbers of particles, the same on each machine."""
 
 import json
 from collections import defaultdict
@@ -79,8 +76,6 @@ class Job:
 def share_out(seconds: Mapping[str, float]) -> dict[str, list[str]]:
     """Share tasks out in bundles of about equal work, the more the longer they take.
 
-    Examples
-    --------
     >>> share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0})
     {'0': ['fine'], '1': ['coarse', 'middle']}
     """

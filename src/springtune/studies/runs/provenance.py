@@ -78,10 +78,7 @@ def input_files(study: Study) -> list[Path]:
 
 
 def library_commit(package: Path = PACKAGE) -> str:
-    """Commit of the library, as a built package notes it or of its clone; empty if unknown.
-
-    It ends with `CHANGED` if files of the clone differ.
-    """
+    """Commit of the library, empty if unknown; it ends with `CHANGED` if files of the clone differ."""
     noted, root = package / COMMIT_FILE, clone(package)
     if noted.is_file() or root is None:
         return noted.read_text().strip() if noted.is_file() else ""

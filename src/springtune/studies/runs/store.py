@@ -1,9 +1,8 @@
 """Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
-Scalars and texts are one JSON text, since HDF5 attributes cost more than solving. Arrays of a label that are written
-together and have one shape are rows of a dataset; the JSON text also has their places. Former results stay.
-Structures have checksums by the file format ``latest``, data by the filter Fletcher-32, and a file has its name in
-it, so that damaged and exchanged files are found.
+Scalars and texts are one JSON text, since HDF5 attributes cost more than solving. Arrays that are written together and
+have one shape are rows of a dataset; the JSON text has their places. Structures have checksums by the file format
+``latest``, data by the filter Fletcher-32, and a file has its name in it: damaged and exchanged files are found.
 """
 
 import io
@@ -120,17 +119,7 @@ class ResultBuffer:
 
 
 def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
-    """Add results to a file atomically.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "results.h5"
-    ...     add(path, {"one": {"displacement": 1.25e-3, "field": np.arange(3.0)}})
-    ...     read(path, stored_keys(path), ["field"])
-    {'one': {'displacement': 0.00125, 'field': array([0., 1., 2.])}}
-    """
+    """Add results to a file atomically; former results stay."""
     if not results:
         return
     import h5py  # here: a plan reads no results

@@ -1,7 +1,6 @@
-"""Other ways to a beam's displacement, for the benchmark: those of the paper, and plain finite elements.
+"""Other ways to a beam's displacement, all linear, for the benchmark: those of the paper, and plain finite elements.
 
-Each takes a scene, a mesh size and a clock, and returns the displacement of the loaded side and the number of unknowns.
-All are linear.
+Each takes a scene, a mesh size and a clock, and returns the loaded side's displacement and the number of unknowns.
 """
 
 import time

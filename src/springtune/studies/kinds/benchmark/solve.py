@@ -1,7 +1,4 @@
-"""Stage `benchmark`: run time and error of definitions on all mesh types and of other approaches.
-
-The first run of a case imports what the approach needs, and does not count.
-"""
+"""Stage `benchmark`: run time, without a first run, and error of definitions on all mesh types and other approaches."""
 
 import time
 import traceback
@@ -108,10 +105,7 @@ class Clock:
 
 
 def measure(scene, cases, most_seconds):
-    """Rows of the reference and of all cases, from coarse to fine.
-
-    A failed case has a status and a message, and so have all finer sizes of an approach that exceeds its seconds.
-    """
+    """Rows of the reference and of all cases, from coarse to fine; an approach that is too slow fails from there."""
     clock, beyond, rows = Clock(), {}, defaultdict(list)
     with clock("solving"):
         reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)

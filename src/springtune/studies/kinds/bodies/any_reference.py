@@ -1,7 +1,4 @@
-"""References for curves and the dataset, solved one by one or interpolated.
-
-The stage `solve` does not import this module: it needs whole fields, which interpolants have not.
-"""
+"""References for curves and the dataset, solved one by one or interpolated; `solve` needs whole fields instead."""
 
 from functools import lru_cache
 from pathlib import Path

@@ -339,10 +339,7 @@ def _draw_panels(ax, shown, draw, title, sign):
 
 
 def _draw_lines(panel, places, here, looks, listed, gaps):
-    """Draw a line a definition, hollow where its error is doubtful; return notes.
-
-    ``places`` has the x of each line. With ``gaps``, a line has gaps where no scene was requested.
-    """
+    """Draw a line a definition over ``places``, hollow where its error is doubtful; return notes."""
     said, doubts = [], set()
     for x, (name, look) in zip(places, looks.items()):
         cell = here.sel(definition=name)

@@ -1,7 +1,6 @@
 """Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``.
 
-The part of this kind in a study has its shapes alone, or None: meshes, scenes, curves and references of beams are
-attributes of `springtune.studies.config.model.Study`. `summary` describes a study before it runs.
+The part of this kind in a study has its shapes alone, or None; beams are attributes of the study.
 """
 
 from collections import Counter

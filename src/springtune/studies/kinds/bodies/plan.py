@@ -108,12 +108,8 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
 def box_of(problems: set[tuple[float, float]]) -> "Box":
     """Box of aspect ratios and Poisson's ratios around unit problems, its ends rounded outwards.
 
-    Examples
-    --------
-    >>> box_of({(1.5, 0.3), (5, 0.3)})
-    ((1.258925, 5.011872), (0.3, 0.3))
-    >>> box_of({(2, -0.98), (2, 0.49)})
-    ((2.0, 2.0), (-0.98, 0.5))
+    >>> box_of({(1.5, 0.3), (5, 0.3)}), box_of({(2, -0.98), (2, 0.49)})
+    (((1.258925, 5.011872), (0.3, 0.3)), ((2.0, 2.0), (-0.98, 0.5)))
     """
     aspects, nus = ([float(one[axis]) for one in problems] for axis in range(2))
     first, last, least, largest = min(aspects), max(aspects), min(nus), max(nus)
@@ -231,10 +227,7 @@ def finite_problem(reference, kind):
 
 @cache_by_study
 def scene_tasks(study):
-    """Tasks of a study's scenes by mesh, in the order of `scenes_by_mesh`.
-
-    A task's key ignores the calibration; `stored.stored_key` adds the calibrated stiffness.
-    """
+    """Tasks of a study's scenes by mesh; `stored.stored_key` adds the calibrated stiffness to their keys."""
     return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in scenes_by_mesh(study).items()}
 
 

@@ -1,7 +1,4 @@
-"""Stage `reference`: a finite-element solution each unit problem of beams, scene at finite strain, and case of a shape.
-
-Where a study has many unit problems, an interpolant answers for all of a kind of load.
-"""
+"""Stage `reference`: finite elements, or an interpolant for a kind of load if a study has many unit problems."""
 
 import sys
 import time

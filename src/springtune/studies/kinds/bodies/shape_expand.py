@@ -43,10 +43,7 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes of a study by name, materials of their parts, scenes, refinements, and mesh files by size.
-
-    Cases that have a reference are `referred`, and with a law at finite strain, `finite`.
-    """
+    """Shapes of a study by name, with materials of parts, scenes, refinements, mesh files and referred cases."""
 
     shape: dict[str, Shape]
     parts: dict[str, dict[str, str]]

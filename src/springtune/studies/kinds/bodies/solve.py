@@ -102,10 +102,7 @@ def _solve_problem(about, springs, seconds, task):
 
 
 def solve_beam(beam, sheet, field, task):
-    """Result of a scene of a beam.
-
-    ``field`` returns the displacements of a scene's reference for 1 N at the particles [m], or None.
-    """
+    """Result of a scene of a beam; ``field`` returns a reference's displacements for 1 N at particles, or None."""
     stiffness, group = task.get("stiffness"), task.get("calibrated")
     if group:
         if group["stiffness"] is None:
@@ -153,10 +150,7 @@ def _pressed_face(sheet, kind, displacements):
 
 
 def solve_shape(described, grouped, sheets, task):
-    """Result of a scene of a shape; its ``thickness``, ``load`` and ``materials`` are as `task_values` has them.
-
-    ``sheets`` caches the mesh by thickness.
-    """
+    """Result of a scene of a shape; ``sheets`` caches the mesh by thickness."""
     from .task_values import LOAD_NAME, materials_of, shape_of, values_by_key  # here: most studies have no shapes
 
     shape = shape_of(described, task["thickness"], task["load"])

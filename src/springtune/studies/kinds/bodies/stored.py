@@ -1,7 +1,6 @@
 """Reading and writing of stored meshes, references and scenes.
 
-A mesh is a VTU file and a stored result with the checksum of that file, its quality and, of a shape, its groups. A mesh
-that cannot be made has no VTU file, and its result says why.
+A mesh is a VTU file, unless it cannot be made, and a stored result with the file's checksum, its quality and groups.
 """
 
 import hashlib
@@ -121,10 +120,7 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
 
 
 def read_reference(folder: str | Path, reference: dict[str, Any], fields: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Reference that is solved by itself for 1 N [m, rad, 1]; not converged, it has ``message`` and ``seconds`` alone.
-
-    ``reference`` has the ``key`` of its unit problem and the scales ``length`` [m] and ``displacement`` [m/N].
-    """
+    """Reference solved by itself, for 1 N [m, rad, 1]; not converged, it has ``message`` and ``seconds`` alone."""
     return scaled(store.read_one(folder, reference["key"], fields), reference)
 
 

@@ -20,13 +20,7 @@ SHAPE_NAME, LOAD_NAME = "shape", "load"
 
 
 def quantity_key(quantity: Quantity) -> str:
-    """Key of a quantity that does not depend on its name.
-
-    Examples
-    --------
-    >>> quantity_key(Quantity("tip", "displacement", "end", "y", expected=1e-3))
-    'displacement y end'
-    """
+    """Key of a quantity that does not depend on its name, as ``displacement y end``."""
     return " ".join(filter(None, (quantity.kind, quantity.component, quantity.of)))
 
 

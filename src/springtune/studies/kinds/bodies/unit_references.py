@@ -1,7 +1,6 @@
 """References in small strain: unit problems, and interpolants that answer for many of them.
 
-The file of an interpolant that meets no tolerance has the reason and, solved one by one, the unit problems that were
-asked of it. Apart from the stage, so that interpolants of samples do not depend on finite strain.
+An interpolant that meets no tolerance has the reason and, solved one by one, the unit problems asked of it.
 """
 
 import time

@@ -49,9 +49,8 @@ FIELDS = declared(
     | dict.fromkeys(("particle_reference_x", "particle_reference_y"), PARTICLE_ATTRIBUTES)
     | {"stiffness": SPRING_ATTRIBUTES},
 )
-"""Whole fields of the coarsest mesh of each beam and mesh type.
+"""Whole fields of the coarsest mesh of each beam and mesh type, by UGRID-1.0 without the padding of its arrays.
 
-Each selected mesh follows UGRID-1.0 without the padding of its arrays, see `springtune.studies.output.reading.field`.
 The force of springs is not called "force", a dimension of the root where a study sweeps it.
 """
 

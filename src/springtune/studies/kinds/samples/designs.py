@@ -1,6 +1,6 @@
-"""Designs of samples: points of the unit cube, and the parameters of scenes that distributions make of them.
+"""Designs of samples: points of the unit cube, and the parameters that distributions make of them.
 
-All are extendable: the first half of a sample of twice the size is the sample, bit for bit.
+The first half of a sample of twice the size is the sample, bit for bit.
 """
 
 from collections.abc import Iterable, Mapping
@@ -37,8 +37,6 @@ MOST_SOBOL_POINTS = 512
 def blocks(design: str, size: int) -> list[tuple[int, int]]:
     """First base sample of each task, and the one after its last. Those of a size begin with those of half the size.
 
-    Examples
-    --------
     >>> blocks("sobol-indices", 16), blocks("sobol-indices", 32)
     ([(0, 8), (8, 16)], [(0, 8), (8, 16), (16, 32)])
     """
@@ -52,8 +50,6 @@ def blocks(design: str, size: int) -> list[tuple[int, int]]:
 def points(dimensions: int, seed: int, first: int, last: int) -> np.ndarray:
     """Draw scrambled Sobol points `first` to `last` of the unit cube, shape (last - first, dimensions).
 
-    Examples
-    --------
     >>> bool((points(2, 1, 0, 16)[8:] == points(2, 1, 8, 16)).all())
     True
     """
@@ -68,8 +64,6 @@ def points(dimensions: int, seed: int, first: int, last: int) -> np.ndarray:
 def quantile(distribution: Mapping[str, Any], shares: np.ndarray) -> np.ndarray:
     """Return the quantiles of a distribution.
 
-    Examples
-    --------
     >>> spread = {"distribution": "log-uniform", "low": 1.0, "high": 100.0}
     >>> quantile(spread, np.array([0.0, 0.5, 1.0])).round(9).tolist()
     [1.0, 10.0, 100.0]
@@ -98,13 +92,7 @@ def varied(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def roles(design: str, names: Iterable[str]) -> list[str]:
-    """Name the rows of a base sample.
-
-    Examples
-    --------
-    >>> roles("sobol-indices", ["length", "force"])
-    ['A', 'B', 'AB_length', 'AB_force']
-    """
+    """Name the rows of a base sample, as A, B, AB_length, AB_force."""
     return ["A", "B", *(f"AB_{name}" for name in names)] if design == SOBOL_INDICES else ["A"]
 
 
@@ -113,8 +101,7 @@ def draw(
 ) -> dict[str, np.ndarray]:
     """Draw the parameters of the scenes of some base samples, with `mesh_size`, shape (n_rows,); see `roles`.
 
-    Rows A and B of a base sample are the halves of one point of twice the dimensions; AB_i is A with parameter i of B
-    (Saltelli et al., Comput. Phys. Commun. 181:259, 2010).
+    AB_i is A with parameter i of B (Saltelli et al., Comput. Phys. Commun. 181:259, 2010).
     """
     names, pair = varied(parameters), design == SOBOL_INDICES
     count = len(names)

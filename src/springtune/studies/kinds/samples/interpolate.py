@@ -1,7 +1,4 @@
-"""Stage `interpolate`: the references of all beams of a sample, as one function of aspect and Poisson's ratio.
-
-Where no such function is good enough the references of a small sample are solved one by one.
-"""
+"""Stage `interpolate`: references of a sample's beams as a function of aspect and Poisson's ratio, or one by one."""
 
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,7 @@
-"""Stage `sample`: the networks of sampled scenes.
+"""Stage `sample`: the networks of sampled scenes, in linear kinematics, with E t = 1 and 1 m of force over E t.
 
-Networks have E t = 1, linear kinematics, and carry 1 m of force over E t. Thickness, modulus and force only scale the
-result: rows that differ in these alone are solved once. Meshes with as many cells along x and y follow each other: they
-share numbering, sparsity and symbolic factorization.
+Rows that differ in thickness, modulus and force alone are solved once. Meshes with as many cells along x and y follow
+each other: they share numbering, sparsity and symbolic factorization.
 """
 
 from functools import partial

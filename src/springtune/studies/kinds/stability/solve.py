@@ -1,6 +1,6 @@
 """Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset.
 
-Each experiment takes a `Setup` and yields rows: labels of `AXES` and mesh sizes, and results by variable of the group.
+An experiment takes a `Setup` and yields labels of `AXES` and mesh sizes, and results by variable.
 """
 
 import time
@@ -338,10 +338,7 @@ def contrast(setup):
 
 
 def _refined_solution(problem, s, displacements):
-    """Linear solution by iterative refinement, residuals spring by spring in extended precision.
-
-    The assembled matrix would not do: its entries are rounded, and if ill-conditioned it is another network's.
-    """
+    """Linear solution by iterative refinement, residuals spring by spring in extended precision."""
     network = problem.network
     normals = network.rest_vectors.astype(np.longdouble)
     normals /= np.sqrt((normals**2).sum(axis=1))[:, None]

@@ -1,7 +1,4 @@
-"""The page to browse a dataset with: one file that needs neither a server nor a network.
-
-Study kinds declare the views of their groups in ``outputs``.
-"""
+"""The page to browse a dataset with: one file that needs neither a server nor a network."""
 
 from __future__ import annotations
 
@@ -17,9 +14,9 @@ if TYPE_CHECKING:
 class Plot:
     """A plot of a group; readers choose along unnamed dimensions.
 
-    `value` is the plotted variable; `by` has one line a label, or is a map's y axis. A line joins the points `along` a
-    dimension if `x` is a variable, in the order of `x` if `ascending`. `log` names logarithmic axes ("x", "y", "xy"),
-    which show magnitudes. `beside` lists further lines as (x, variable, name).
+    `by` has one line a label, or is a map's y axis. A line joins the points `along` a dimension if `x` is a variable,
+    in the order of `x` if `ascending`. `log` names logarithmic axes ("x", "y", "xy"), which show magnitudes. `beside`
+    lists further lines as (x, variable, name).
     """
 
     title: str
@@ -47,10 +44,7 @@ def particle_plots(outline: str) -> tuple[Plot, ...]:
 
 @dataclass(frozen=True)
 class View:
-    """View of a group: its `plots`, the first shown first, and table `columns` for the root.
-
-    Plots whose variables are missing are left out.
-    """
+    """View of a group: its `plots`, without missing variables, and table `columns` for the root."""
 
     group: str
     title: str

@@ -1,7 +1,4 @@
-"""The overview that a page opens on: what to type, errors of definitions, curves, run times and the paper's tables.
-
-`assets/overview.html` shows it without a script.
-"""
+"""The overview that a page opens on, without a script: what to type, errors, curves, run times, the paper's tables."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,8 +1,7 @@
 """The page: a dataset, the views of the study kinds, and BokehJS from its installed package, in one file.
 
-Numbers are packed as float32 without the digits that the page never shows. An array with a long last dimension (a
-curve, a field) keeps only rows with values, as differences from point to point. Bytes are sorted by their place in a
-number, where they are alike, and each variable is compressed. `assets/data.js` reads it.
+Numbers are packed as float32 without the digits that the page never shows, long arrays only with rows of values, as
+differences from point to point, and bytes sorted by their place in a number. `assets/data.js` reads it.
 """
 
 import base64
