@@ -299,12 +299,11 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         low, high = float(errors.min()), float(errors.max())
         if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= MOST_SPREAD:
             return (low, high), ""
-        between = _between((low, high), runs[0].reference)
-        between = _between((low, high), runs[0].reference)
+        said = f"is {_between((low, high), runs[0].reference)} in" if low == low else "diverges in some of"
         return (low, high), (
-            f"the error at {setting} is {between} in {TRIED_ORDERS} orders of the same particles, with {factor:.4g} "
-            "times the numbers of the definition: the solver has not converged, so no factor holds in other scripts; "
-            "take more substeps or iterations"
+            f"the error at {setting} {said} {TRIED_ORDERS} orders of the same particles, with {factor:.4g} times the "
+            "numbers of the definition: the solver has not converged, so no factor holds in other scripts; take more "
+            "substeps or iterations"
         )
 
     def ratio(self, factor: float, setting: Setting) -> float:
