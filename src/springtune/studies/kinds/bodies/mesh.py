@@ -36,4 +36,5 @@ def run(content, attempts):
         grouped = made if isinstance(made, GroupedMesh) else GroupedMesh(made)
         mesh = grouped.mesh
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
+        known["edge_length"] = float(mesh.edge_lengths.mean())
         stored.write(folder, name, task["key"], grouped, known)

@@ -204,6 +204,8 @@ def _in_fitting_unit(row):
     size = next((one for one in sizes if one > 0), 1.0)
     units = FITTING_UNITS.get(row["units"], {row["units"]: 1.0})
     unit = next((name for name, factor in units.items() if size >= 0.1 * factor), [*units][-1])
+    length = 1e3 * row.pop("edge_length")
+    row["mesh_size_mm"] = row["mesh_size_mm"] or length  # 0 of a mesh file
     scaled = {name: row[name] / units[unit] for name in ("value", "reference", "expected")}
     return row | scaled | {"units": unit, "status": STATUS[row["status"]]}
 
@@ -216,7 +218,7 @@ def _shape_table(tree):
     columns = {"mesh_size_mm": ("mesh_size", 1e3), "particles": ("particles", 1), "value": ("value", 1)}
     columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
     columns |= {f"{name}_percent": (name, 100) for name in SHAPE_ERRORS}
-    columns |= {"sign": ("quantity_kind", 1), "kind": ("quantity_kind", 1)}
+    columns |= {"sign": ("quantity_kind", 1), "kind": ("quantity_kind", 1), "edge_length": ("edge_length", 1)}
     columns |= {name: (name, 1) for name in ("status", "message")}
     rows = [_in_fitting_unit(row) for row in table_rows(data, present, SHAPE_COLUMNS, columns)]
     cited = (one for one in records(data, present, ["source"]) if one["source"])
