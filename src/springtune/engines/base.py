@@ -157,30 +157,20 @@ class Engine(Declaration):
 
     Attributes
     ----------
-    name : str
-        Program and solver, such as ``newton-vbd``; a label of datasets.
+    name, order : str, float
+        Program and solver, such as ``newton-vbd``, a label of datasets; and its place among the labels.
     function : callable
         (net, setting, damping over mass [1/s]) -> `Session`.
-    order : float
-        Place in the order of labels.
-    program : str
-        ``springtune`` for the textbook solvers.
-    needs : tuple of str
-        Modules that it imports, also with their first version: ``"mujoco>=3.13"``.
-    extra : str
-        Optional dependencies of springtune that have them.
+    program, source : str
+        ``springtune`` for the textbook solvers, and where it is described.
+    needs, extra : tuple of str, str
+        Modules that it imports, as ``"mujoco>=3.13"``, and the optional dependencies of springtune that have them.
     laws : tuple of str
         Energies that it has besides springs, keys of `springtune.handover.terms.FORMULAS`.
-    precisions : tuple of str
-        Its own first.
-    parameters : dict of str to Parameter
-        Numbers that are typed into it.
-    iterates : bool
-        Whether iterations mean something to it.
-    typed : callable
-        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
-    of_setting : bool
-        Whether these numbers depend on the setting: `typed` takes (net, setting).
+    precisions, iterates : tuple of str, bool
+        Its own precision first; whether iterations mean something to it.
+    parameters, typed, of_setting : dict of str to Parameter, callable, bool
+        Numbers to type: (net), or (net, setting) if they depend on it, -> dict of arrays, or one number for all.
     springs_first : bool
         Whether it is taken with springs alone unless a definition with energies is asked for.
     law : callable, optional
@@ -189,8 +179,6 @@ class Engine(Declaration):
         What else a script sets, as runs here do.
     measured : str
         Bound of the difference from the equilibrium of its own law, over the displacement, at converged settings.
-    source : str
-        Where it is described.
 
     Examples
     --------

@@ -67,8 +67,7 @@ class LoadBand(Tabled):
 
     Attributes
     ----------
-    load : str
-    sizes : tuple of float
+    load, sizes : str, tuple of float
         Tested forces on a beam [N], or factors on a load case of a shape [1].
     errors : tuple of float
         In the engine at each size [1]; NaN where it does not come to rest.
@@ -116,14 +115,10 @@ class NeededSetting(Tabled):
     ----------
     raised : str
         ``"substeps"`` or ``"iterations"``.
-    setting : Setting
-        The first one that serves, or the last one that was tried.
-    found : bool
-        Whether it serves.
-    solver_error : float
-        There, without a factor [1]: the largest one in some orders of particles.
-    frame_seconds : float
-        Time that a frame took there [s].
+    setting, found : Setting, bool
+        The first one that serves, or the last one that was tried, and whether it serves.
+    solver_error, frame_seconds : float
+        There, without a factor [1]: the largest one in some orders of particles; and the time of a frame [s].
     typed : str
         The numbers to type there, those of the definition.
 
@@ -161,16 +156,12 @@ class EngineFit(Tabled):
     scene : Scene
     factor : float
         On all stiffnesses and moduli that are typed [1]; NaN where there is none, for the reason in `message`.
-    result : EngineResult
-        With the factor; where there is none, with the one that came nearest.
-    untuned : EngineResult
-        Without a factor.
+    result, untuned : EngineResult
+        With the factor, or the one that came nearest; and without a factor.
     typed : dict of str to float or ndarray
         The numbers to type by the names of the engine's `parameters`, with the factor in them.
-    bands : TabledList of LoadBand
-        The load of the scene first.
-    needed : TabledList of NeededSetting
-        What a converged setting needs.
+    bands, needed : TabledList of LoadBand, TabledList of NeededSetting
+        By load, the scene's first; and what a converged setting needs.
     message : str
         Why there is no factor, or what else is to be known.
     spread : tuple of float
@@ -212,7 +203,6 @@ class EngineFit(Tabled):
         Returns
         -------
         SpringNet
-            Its header says the engine and the setting.
 
         Raises
         ------
@@ -337,10 +327,8 @@ def fit_engine(
         Further loads that get a band, with the force that moves the reference as far; by default all that do not turn.
     needed : bool, optional
         Whether to look for settings that converge, which takes the longest.
-    frames : int, optional
-        Most frames of each run, as of `in_engine`.
-    **parts
-        In the place of a setting its parts: ``dt``, ``substeps``, ``iterations``, ``precision``.
+    frames, **parts
+        As of `in_engine`.
 
     Returns
     -------

@@ -90,23 +90,15 @@ class EngineResult(Tabled, Ended):
     ----------
     displacements : ndarray of float, shape (n_points, 2)
         Of the particles [m]; mean ones where it swings, NaN where it diverged.
-    status : str
-        ``"rest"``; ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the last frame;
-        ``"inverted"``: it rests with cells turned inside out; or ``"diverged"``.
-    message : str
-        Why it is not at rest; empty where it is.
-    frames : int
-    frame_seconds : float
+    status, message : str
+        ``"rest"``; else, and why: ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the
+        last frame; ``"inverted"``: it rests with cells turned inside out; or ``"diverged"``.
+    frames, frame_seconds : int, float
         Time that a frame took, without the first one, which may compile [s]; NaN of a single frame.
     swing : float
         Largest amplitude about the mean, where it swings [m].
-    scene : Scene
-    engine : str
-    setting : Setting
-    factor : float
-        On all stiffnesses and moduli that were typed [1].
-    damping : float
-        Over mass [1/s].
+    scene, engine, setting, factor, damping
+        As of `in_engine`.
 
     Examples
     --------

@@ -97,9 +97,7 @@ class SpringNet(Tabled, Net):
     header : dict
         Plain texts, numbers and dicts: definition, its formula and source, beam, material, mesh, load, expected errors
         [1], largest stable time steps [s], units, and the version of springtune.
-    triangles : ndarray of int, shape (n_triangles, 3)
-        Cells of the mesh.
-    quads : ndarray of int, shape (n_quads, 4)
+    triangles, quads : ndarray of int, shape (n, 3) or (n, 4)
 
     Examples
     --------
@@ -261,7 +259,6 @@ class SpringNet(Tabled, Net):
         Returns
         -------
         list of Path
-            What was written.
 
         Raises
         ------

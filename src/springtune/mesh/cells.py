@@ -48,10 +48,8 @@ class Mesh:
     ----------
     points : ndarray of float, shape (n_points, 2)
         Coordinates [m].
-    triangles : ndarray of int, shape (n_triangles, 3)
-        Corner indices, counter-clockwise.
-    quads : ndarray of int, shape (n_quads, 4), optional
-        Corner indices, counter-clockwise.
+    triangles, quads : ndarray of int, shape (n, 3) or (n, 4)
+        Corner indices, counter-clockwise; quadrilaterals are optional.
     bonds : ndarray of int, shape (n_bonds, 2), optional
         Further pairs of points with a spring, which no cell joins; see `springtune.mesh.sheets.bonded`.
 
@@ -79,6 +77,16 @@ class Mesh:
     [1.0, 1.414, 1.0, 1.0, 1.0]
     >>> mesh.area, mesh.particle_areas.round(3).tolist()
     (1.0, [0.333, 0.167, 0.333, 0.167])
+
+    >>> mesh.sum_to_edges({3: np.ones((2, 3))}).tolist()  # edges of the cells, counted
+    [1.0, 2.0, 1.0, 1.0, 1.0]
+    >>> right = mesh.outline_edges(0, 1.0)
+    >>> right.tolist(), mesh.side_shares(right, axis=1).tolist()
+    ([[1, 2]], [0.0, 0.5, 0.5, 0.0])
+    >>> mesh.inverted(mesh.points * [-1, -1]), mesh.inverted(mesh.points * [-1, 1])  # rotated, mirrored
+    (False, True)
+    >>> st.Mesh(2 * points, mesh.triangles).shares_cells(mesh)
+    True
 
     As one quadrilateral it has both diagonals:
 
@@ -153,14 +161,6 @@ class Mesh:
         Returns
         -------
         bool
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
-        >>> longer = st.make_mesh(st.Beam("201 mm", "40 mm"), "structured", "5 mm")
-        >>> longer.shares_cells(mesh), longer.edges is mesh.edges
-        (True, True)
         """
         cells, others = self.cells, other.cells
         same = len(self.points) == len(other.points) and cells.keys() == others.keys()
@@ -216,17 +216,6 @@ class Mesh:
         Returns
         -------
         ndarray of float, shape (n_edges,)
-
-        Examples
-        --------
-        Edges of the cells, counted:
-
-        >>> import numpy as np
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
-        >>> counts = mesh.sum_to_edges({3: np.ones((len(mesh.triangles), 3))})
-        >>> bool((counts == mesh.cells_per_edge).all())
-        True
         """
         total = np.zeros(len(self.edges))
         for count, part in values.items():
@@ -255,16 +244,6 @@ class Mesh:
         -------
         ndarray of float, shape (n_points,)
             [m]
-
-        Examples
-        --------
-        Shares of an even force on the right side:
-
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")
-        >>> shares = mesh.side_shares(mesh.outline_edges(0, 0.2), axis=1)
-        >>> shares[shares > 0].round(6).tolist()
-        [0.01, 0.02, 0.01]
         """
         shares = np.zeros(len(self.points))
         extent = np.abs(self.points[edges[:, 1], axis] - self.points[edges[:, 0], axis])
@@ -284,13 +263,6 @@ class Mesh:
         Returns
         -------
         ndarray of int, shape (n, 2)
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")
-        >>> mesh.points[mesh.outline_edges(0, 0.2)].tolist()
-        [[[0.2, 0.0], [0.2, 0.02]], [[0.2, 0.02], [0.2, 0.04]]]
         """
         outline = self.edges[self.on_outline]
         tolerance = 1e-9 * np.ptp(self.points[:, coordinate])
@@ -307,15 +279,6 @@ class Mesh:
         Returns
         -------
         bool
-
-        Examples
-        --------
-        A rotated mesh is not inverted, a mirrored one is:
-
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
-        >>> mesh.inverted(mesh.points * [-1, -1]), mesh.inverted(mesh.points * [-1, 1])
-        (False, True)
         """
         for count, corners in self.cells.items():
             for i in range(1 if count == 3 else count):

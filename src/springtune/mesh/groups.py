@@ -38,6 +38,14 @@ class GroupedMesh:
     {'lower': 10, 'right': 4, 'upper': 10, 'left': 4}
     >>> grouped.mesh.points[grouped.sides["right"][0]].round(6).tolist()
     [[0.1, 0.0], [0.1, 0.01]]
+    >>> grouped.mesh.points[grouped.particles("right"), 1].round(6).tolist()
+    [0.0, 0.01, 0.02, 0.03, 0.04]
+    >>> corner = st.GroupedMesh(grouped.mesh, points={"corner": grouped.mesh.points[-1]})
+    >>> corner.particle("corner") == len(grouped.mesh.points) - 1
+    True
+    >>> turned = st.GroupedMesh(grouped.mesh, {"left": grouped.sides["left"][:, ::-1]})
+    >>> turned.side_fault("left"), turned.side_fault("left", directed=True)
+    ('', 'has edges with the body on their right, the first one from (0, 30) mm to (0, 40) mm; turn them')
     """
 
     mesh: Mesh
@@ -63,14 +71,6 @@ class GroupedMesh:
         -------
         int or None
             None if no particle is within rounding.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> plate = st.Shape.rectangle("100 mm", "40 mm", points={"corner": ("100 mm", "40 mm")})
-        >>> grouped = st.mesh_shape(plate, "10 mm")
-        >>> grouped.mesh.points[grouped.particle("corner")].tolist()
-        [0.1, 0.04]
         """
         distances = np.linalg.norm(self.mesh.points - self.points[name], axis=1)
         nearest = int(np.argmin(distances))
@@ -88,13 +88,6 @@ class GroupedMesh:
         -------
         ndarray of int
             Sorted, each once; empty for a point without particle.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "10 mm")
-        >>> grouped.mesh.points[grouped.particles("right"), 1].round(6).tolist()
-        [0.0, 0.01, 0.02, 0.03, 0.04]
         """
         if name in self.sides:
             return np.unique(self.sides[name])
@@ -119,14 +112,6 @@ class GroupedMesh:
         Returns
         -------
         str
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "20 mm")
-        >>> turned = st.GroupedMesh(grouped.mesh, {"left": grouped.sides["left"][:, ::-1]})
-        >>> turned.side_fault("left"), turned.side_fault("left", directed=True)
-        ('', 'has edges with the body on their right, the first one from (0, 20) mm to (0, 40) mm; turn them')
         """
         count, edges = len(self.mesh.points), np.reshape(self.sides[name], (-1, 2))
         wrong = edges[~np.isin(edges @ [count, 1], self._outline_codes)]

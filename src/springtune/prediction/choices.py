@@ -86,10 +86,9 @@ class Choice(Tabled):
         (network - reference) / abs(reference) [1]: positive means too soft; where displacements are negative, as under
         compression and pressure, negative does. NaN without a reference, for the reason in `failures`, and of a
         quantity that is negligible beside others of its kind.
-    young_modulus_error : float
-        Young's modulus along x between rollers over the material's, less one [1].
-    poisson_ratio : float
-        Poisson's ratio there [1], in the plane: in plane strain nu / (1 - nu) is exact.
+    young_modulus_error, poisson_ratio : float
+        Young's modulus along x between rollers over the material's, less one, and Poisson's ratio there [1], in the
+        plane: in plane strain nu / (1 - nu) is exact.
     failures : dict of str to str
         Why numbers are missing, by load, ``"patch test"`` or ``"springs"``: the network is unstable, singular or
         ill-conditioned at rest, or the definition does not support the mesh.
@@ -231,13 +230,13 @@ def predict(
 ) -> list[Choice]:
     """Solve definitions on a mesh and return the best ones, by their worst load or quantity of a shape.
 
+    All of `springtune.DEFINITIONS` are tried that suit the cells and the material, in linear kinematics, but for
+    searches and for those that need a stiffness or a uniaxial load.
+
     Parameters
     ----------
-    beam : Beam or Shape
-    mesh : Mesh or GroupedMesh
-        That fills the beam; of a shape with its groups.
-    material : Material, AnisotropicMaterial or mapping of str to those
-        Of a shape of several parts by their names.
+    beam, mesh, material
+        As of `Scene`.
     known : dict, optional
         References of the loads or quantities, as `springtune.prediction.choices.references` returns them.
     loads : iterable of str, optional
@@ -261,11 +260,6 @@ def predict(
     DefinitionError
         If no definition supports the mesh.
 
-    Notes
-    -----
-    Each number equals that of a scene of the same beam, mesh, material, load and definition in linear kinematics.
-    All of `springtune.DEFINITIONS` are tried that suit the cells and the material, but for searches and for those that
-    need a stiffness or a uniaxial load.
 
     Examples
     --------

@@ -83,10 +83,8 @@ class SolvedMesh:
 
     Attributes
     ----------
-    mesh_type : str
-        Key of `springtune.MESH_TYPES`.
-    size : float
-        Length of an edge [m].
+    mesh_type, size : str, float
+        Key of `springtune.MESH_TYPES`, and length of an edge [m].
     cells : float
         Cells across the beam's smaller side that its size is for; not whole between whole divisions.
     particles, springs : int
@@ -133,12 +131,8 @@ class MeshChoice(Tabled):
 
     Attributes
     ----------
-    mesh_type : str
-        Key of `springtune.MESH_TYPES`.
-    size : float
-        Length of an edge [m].
-    cells : int
-        Cells across the beam's smaller side, about.
+    mesh_type, size, cells : str, float, int
+        As of `SolvedMesh`.
     choice : Choice
         The definition, its stiffness and its errors.
     particles, springs : int
@@ -193,19 +187,13 @@ class MeshSearch(Tabled):
 
     Attributes
     ----------
-    error : float
-        Error to keep [1].
-    loads : tuple of str
-        Loads that keep it; of a shape quantities of interest.
-    most : int
-        Particles of the largest mesh that may be tried.
+    error, loads, most : float, tuple of str, int
+        As of `find_mesh`; of a shape quantities of interest.
     known : dict
         Reference of 1 N by load, or by quantity of interest.
-    by_type : dict of str to MeshChoice or None
-        The coarsest mesh by mesh type, with a definition that keeps the error; None if there is none that finer meshes
-        of up to `most` particles confirm.
-    springs_by_type : dict of str to MeshChoice or None
-        As `by_type`, for springs alone.
+    by_type, springs_by_type : dict of str to MeshChoice or None
+        The coarsest mesh by mesh type, with a definition, or springs alone, that keeps the error; None if there is
+        none that finer meshes of up to `most` particles confirm.
     tried : tuple of SolvedMesh
         All that was solved, each type from coarse to fine.
 
@@ -283,10 +271,9 @@ def find_mesh(
     """Find the coarsest mesh of each type on which a definition keeps an error, by solving.
 
     Meshes are solved with every number of cells across up to 16, then four for each doubling, until a definition keeps
-    the error on a mesh and on all finer ones up to twice as fine, also if it changed once more by as much as over the
-    last doubling. Then sizes between whole divisions are solved. A definition is given up where its error, extrapolated
-    from the last doubling, is too large on the finest mesh as well. Kinematics are linear. The error estimate of the
-    reference is added to each error; errors that differ by less are equal: springs alone come first, then names.
+    the error on a mesh and on all finer ones up to twice as fine, with a margin: the last change may happen once more.
+    Then sizes between whole divisions are solved. Kinematics are linear. The error estimate of the reference is added
+    to each error; errors that differ by less are equal: springs alone come first, then names.
 
     Parameters
     ----------

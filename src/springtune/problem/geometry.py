@@ -58,14 +58,14 @@ class Beam:
     Warns
     -----
     AssumptionWarning
-        If it is thicker than its smaller side: plane stress is for thin sheets. If its longer side is more than 100 m
-        or less than 10 um: numbers are in m.
+        If it is thicker than its smaller side (plane stress is for thin sheets), or its longer side is more than 100 m
+        or less than 10 um (numbers are in m).
 
     Examples
     --------
     >>> import springtune as st
-    >>> st.Beam("200 mm", "40 mm")
-    Beam(length=0.2, height=0.04, thickness=0.001, name='200x40')
+    >>> st.Beam("200 mm", "40 mm"), st.Beam("80 mm", "30 mm", name="pad").label
+    (Beam(length=0.2, height=0.04, thickness=0.001, name='200x40'), 'pad (80 x 30 mm)')
     """
 
     length: Number
@@ -83,14 +83,7 @@ class Beam:
 
     @property
     def label(self) -> str:
-        """Name and size of the sheet, for titles, see `beam_label`.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.Beam("200 mm", "40 mm").label, st.Beam("80 mm", "30 mm", name="pad").label
-        ('200x40 mm', 'pad (80 x 30 mm)')
-        """
+        """Name and size of the sheet, for titles, see `beam_label`."""
         return beam_label(self.name, self.length, self.height)
 
 

@@ -60,14 +60,19 @@ class Material:
     Raises
     ------
     ValueError
-        If a quantity is not above zero or has the wrong unit, the plane is unknown, or
-        Poisson's ratio is out of range.
+        If a quantity is not above zero or has the wrong unit, the plane is unknown, or Poisson's ratio is out of range.
 
     Examples
     --------
     >>> import springtune as st
-    >>> st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+    >>> steel = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+    >>> steel
     Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel', plane='stress')
+    >>> (steel.plane_stress / 1e9).round(2).tolist()
+    [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
+    >>> sheet = st.Material("210 GPa", 0.25, plane="strain").in_plane
+    >>> f"{sheet.young_modulus / 1e9:.0f} GPa, {sheet.poisson_ratio:.4f}"
+    '224 GPa, 0.3333'
     """
 
     young_modulus: Number
@@ -92,18 +97,8 @@ class Material:
     def in_plane(self) -> Material:
         r"""The material whose plane stress is this sheet's behaviour in its plane; all formulas take their E and nu.
 
-        In plane stress the material itself. In plane strain its E and nu are
-
-        .. math:: E' = \frac{E}{1 - \nu^2}, \quad \nu' = \frac{\nu}{1 - \nu} < 1.
-
-        Central springs have nu' = 1/3, and so nu = 1/4 in plane strain.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> sheet = st.Material("210 GPa", 0.25, plane="strain").in_plane
-        >>> f"{sheet.young_modulus / 1e9:.0f} GPa, {sheet.poisson_ratio:.4f}"
-        '224 GPa, 0.3333'
+        In plane stress the material itself; in plane strain :math:`E' = E / (1 - \nu^2)` and :math:`\nu' = \nu / (1 -
+        \nu)`. Central springs have nu' = 1/3, and so nu = 1/4 in plane strain.
         """
         if self.plane == "stress":
             return self
@@ -112,14 +107,7 @@ class Material:
 
     @property
     def plane_stress(self) -> np.ndarray:
-        """Stiffness in plane stress [Pa], shape (3, 3): stresses xx, yy, xy of strains xx, yy and the shear angle xy.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
-        [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
-        """
+        """Stiffness in plane stress [Pa], shape (3, 3): stresses of strains xx, yy and the shear angle xy."""
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
@@ -146,9 +134,7 @@ MOST_TERMS = 3
 
 @dataclass(frozen=True, init=False)
 class Rubber(Material):
-    r"""Incompressible rubber of Yeoh's law, see `springtune.fit_rubber`.
-
-    At small strain it is a `Material` of E = 6 c_1 and nu = 0.5.
+    r"""Incompressible rubber of Yeoh's law; at small strain a `Material` of E = 6 c_1 and nu = 0.5.
 
     Parameters
     ----------
@@ -159,10 +145,8 @@ class Rubber(Material):
         extrapolated.
     test_errors : sequence of (str, float)
         Root mean square of the relative errors [1] by compared test.
-    density : float, str or None
-        Density rho [kg/m3], or a text with its unit; not needed in statics.
-    name : str
-        Label of the material.
+    density, name
+        As of `Material`.
 
     Raises
     ------
@@ -186,6 +170,10 @@ class Rubber(Material):
     (1200000.0, 0.5)
     >>> print(f"{float(rubber.stress('uniaxial', 5.0)) / 1e6:.2f} MPa")
     2.29 MPa
+    >>> [round(float(rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
+    [2.0, 5.062, 2.25]
+    >>> st.fit_rubber("config/treloar/uniaxial.csv", terms=1).errors["uniaxial"].__round__(2)
+    0.28
     """
 
     young_modulus: float = field(init=False)
@@ -213,14 +201,7 @@ class Rubber(Material):
 
     @property
     def errors(self) -> dict[str, float]:
-        """Root mean square of the relative errors of its stress, by compared test [1].
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.fit_rubber("config/treloar/uniaxial.csv", terms=1).errors["uniaxial"].__round__(2)
-        0.28
-        """
+        """Root mean square of the relative errors of its stress, by compared test [1]."""
         return dict(self.test_errors)
 
     @staticmethod
@@ -243,19 +224,13 @@ class Rubber(Material):
         ------
         ValueError
             If the test is unknown.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> [round(float(st.Rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
-        [2.0, 5.062, 2.25]
         """
         q = np.asarray(stretch, float)
         other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """Return the nominal stress at stretches in a test.
+        """Return the nominal stress at stretches in a test: at small strain E, 2 E or 4/3 E times the strain.
 
         Parameters
         ----------
@@ -266,20 +241,6 @@ class Rubber(Material):
         -------
         ndarray of float
             Force over the cross-section at rest [Pa].
-
-        Raises
-        ------
-        ValueError
-            If the test is unknown.
-
-        Examples
-        --------
-        At small strain E, 2 E and 4/3 E times the strain:
-
-        >>> import springtune as st
-        >>> rubber = st.Rubber([1e6 / 6])
-        >>> [round(float(rubber.stress(test, 1 + 1e-6)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
-        [1.0, 2.0, 1.333]
         """
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
         slope = np.zeros(q.shape)
@@ -304,10 +265,8 @@ class AnisotropicMaterial:
         Shear stress for a shear angle [Pa].
     C16, C26 : float or str
         Shear stress for strains along x and y [Pa]; 0 if x and y are axes of the material.
-    density : float, str or None
-        Density rho [kg/m3], or a text with its unit; not needed in statics.
-    name : str
-        Label of the material, e.g. ``"ply"``.
+    density, name
+        As of `Material`.
 
     Attributes
     ----------
@@ -325,6 +284,11 @@ class AnisotropicMaterial:
     >>> board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa", name="board")
     >>> (board.plane_stress / 1e9).tolist()
     [[9.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 2.0]]
+    >>> turned = board.rotated("90 deg")
+    >>> round(turned.C11 / 1e9, 9), round(turned.C22 / 1e9, 9), turned.in_plane is turned
+    (4.0, 9.0, True)
+    >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
+    500000.0
     """
 
     C11: Number
@@ -369,9 +333,8 @@ class AnisotropicMaterial:
             [Pa]
         angle : float or str
             Angle of the fibres from the sheet's x axis, counter-clockwise [rad], or a text with its unit.
-        density : float, str or None
-            [kg/m3]
-        name : str
+        density, name
+            As of `Material`.
 
         Returns
         -------
@@ -471,9 +434,8 @@ class AnisotropicMaterial:
         ----------
         stiffness : ndarray of float, shape (3, 3)
             As `plane_stress` [Pa].
-        density : float, str or None
-            [kg/m3]
-        name : str
+        density, name
+            As of `Material`.
 
         Returns
         -------
@@ -483,12 +445,6 @@ class AnisotropicMaterial:
         ------
         ValueError
             If it is not a symmetric positive definite matrix of that shape.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
-        500000.0
         """
         given = np.asarray(stiffness, dtype=float)
         if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
@@ -498,26 +454,12 @@ class AnisotropicMaterial:
 
     @property
     def in_plane(self) -> AnisotropicMaterial:
-        """The material itself: its constants are those in its plane.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0).in_plane.C11
-        3.0
-        """
+        """The material itself: its constants are those in its plane."""
         return self
 
     @property
     def plane_stress(self) -> np.ndarray:
-        """Stiffness in plane stress [Pa], shape (3, 3): stresses xx, yy, xy of strains xx, yy and the shear angle xy.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
-        [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
-        """
+        """Stiffness in plane stress [Pa], shape (3, 3): stresses of strains xx, yy and the shear angle xy."""
         upper = [self.C11, self.C12, self.C16, self.C22, self.C26, self.C66]
         return np.array(upper)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
@@ -527,25 +469,11 @@ class AnisotropicMaterial:
         Parameters
         ----------
         angle : float or str
-            [rad], or a text with its unit.
+            [rad], or a text with its unit; another one raises ValueError.
 
         Returns
         -------
         AnisotropicMaterial
-
-        Raises
-        ------
-        ValueError
-            If it is not an angle.
-
-        Examples
-        --------
-        A quarter of a turn exchanges the axes:
-
-        >>> import springtune as st
-        >>> turned = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa").rotated("90 deg")
-        >>> round(turned.C11 / 1e9, 9), round(turned.C22 / 1e9, 9)
-        (4.0, 9.0)
         """
         turned = rotated(self.plane_stress, quantity(angle, "angle", "angle"))
         return AnisotropicMaterial.of(turned, self.density, self.name)
@@ -556,16 +484,12 @@ class AnisotropicMaterial:
         Parameters
         ----------
         angle : float or str
-            Of the coupon's length from the x axis, counter-clockwise [rad], or a text with its unit.
+            Of the coupon's length from the x axis, counter-clockwise [rad], or a text with its unit; another one raises
+            ValueError.
 
         Returns
         -------
         EngineeringConstants
-
-        Raises
-        ------
-        ValueError
-            If it is not an angle.
 
         Examples
         --------

@@ -163,9 +163,8 @@ def fit_rubber(
         Files of other tests, only compared.
     terms : int, optional
         1 to 3; 1 is neo-Hooke's law.
-    density : float, str or None
-        [kg/m3]
-    name : str
+    density, name
+        As of `Material`.
 
     Returns
     -------
@@ -181,7 +180,7 @@ def fit_rubber(
 
     Examples
     --------
-    Treloar's rubber, its tests as a testing machine writes them:
+    Treloar's rubber, its tests as a testing machine writes them, and a sheet of it, pulled to some twice its length:
 
     >>> import springtune as st
     >>> folder = "config/treloar"
@@ -191,9 +190,6 @@ def fit_rubber(
     ['0.167 MPa', '-0.00141 MPa', '4.13e-05 MPa'] E = 1.00 MPa
     >>> print({test: f"{100 * error:.0f} %" for test, error in rubber.errors.items()})
     {'uniaxial': '7 %', 'equibiaxial': '23 %', 'pure shear': '7 %'}
-
-    A sheet of it, pulled by the force that stretches it to some twice its length:
-
     >>> beam = st.Beam("100 mm", "20 mm")
     >>> mesh = st.make_mesh(beam, "structured", "5 mm")
     >>> result = st.Scene(beam, mesh, rubber, "traction", "12 N", definition="yeoh").solve()

@@ -138,6 +138,9 @@ class Hole:
     >>> hole = st.Hole.circle(("50 mm", "20 mm"), "8 mm")
     >>> len(hole.outline), hole.outline[0].group
     (4, 'hole')
+    >>> slot = st.Hole.ellipse(("50 mm", "20 mm"), "10 mm", "2 mm", group="slot")
+    >>> [round(segment.start[0], 6) for segment in slot.outline]
+    [0.06, 0.05, 0.04, 0.05]
     """
 
     outline: tuple[Segment, ...]
@@ -158,10 +161,8 @@ class Hole:
 
         Parameters
         ----------
-        centre : tuple of float or str
+        centre, radius : tuple of float or str, float or str
             [m], or texts with their unit.
-        radius : float or str
-            [m]
         group : str, optional
             Group of its sides; by default ``"hole"``, or no group if a part fills it.
         part : str, optional
@@ -170,12 +171,6 @@ class Hole:
         Returns
         -------
         Hole
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.Hole.circle((0, 0), "5 mm", part="core").outline[1]
-        Segment(start=(0.0, 0.005), centre=(0.0, 0.0), group='')
         """
         return cls.ellipse(centre, radius, radius, group, part)
 
@@ -192,23 +187,14 @@ class Hole:
 
         Parameters
         ----------
-        centre : tuple of float or str
-            [m], or texts with their unit.
         across, along : float or str
             Semi-axes along x and y [m].
-        group, part : str, optional
+        centre, group, part : optional
             As of `circle`.
 
         Returns
         -------
         Hole
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> slot = st.Hole.ellipse(("50 mm", "20 mm"), "10 mm", "2 mm", group="slot")
-        >>> [round(segment.start[0], 6) for segment in slot.outline]
-        [0.06, 0.05, 0.04, 0.05]
         """
         x, y = _place(centre, "centre")
         a, b = positive(across, "length", "radius"), positive(along, "length", "radius")
@@ -427,6 +413,11 @@ class LoadCase:
     ... )
     >>> pull.quantities[0].of
     'right'
+    >>> try:
+    ...     pull.check_names(["lfet", "right"], ["corner"])
+    ... except ValueError as error:
+    ...     print(error)
+    load 'pull', support: no group is named 'left'; did you mean 'lfet'? known: lfet, right, corner
     """
 
     name: str
@@ -481,16 +472,6 @@ class LoadCase:
         ------
         ValueError
             With the known names.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> pull = st.LoadCase("pull", (st.Support("lfet", x=0, y=0),), (st.Traction("right", (1, 0)),))
-        >>> try:
-        ...     pull.check_names(["left", "right"], [])
-        ... except ValueError as error:
-        ...     print(error)
-        load 'pull', support: no group is named 'lfet'; did you mean 'left'? known: left, right
         """
         sides, points, unusable = tuple(sides), tuple(points), unusable or {}
         both, where = (*sides, *points), f"load {self.name!r}"
@@ -548,20 +529,25 @@ class Shape:
     Warns
     -----
     AssumptionWarning
-        If a shape with an outline is thicker than the smaller side of its bounding box, or its longer side is more
-        than 100 m or less than 10 um: numbers are in m.
+        As of `Beam`, by the bounding box of a shape with an outline.
 
     Examples
     --------
-    A plate with a hole:
+    A plate with a hole, and one with a core:
 
-    >>> import math
     >>> import springtune as st
     >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
-    >>> plate.label, plate.groups
-    ('100x40 mm', ('lower', 'right', 'upper', 'left', 'hole'))
-    >>> math.isclose(plate.area, 0.1 * 0.04 - math.pi * 0.008**2)
-    True
+    >>> plate.label, plate.groups, plate.extent
+    ('100x40 mm', ('lower', 'right', 'upper', 'left', 'hole'), ((0.0, 0.0), (0.1, 0.04)))
+    >>> print(f"{1e6 * plate.area:.2f} mm2")  # 100 x 40 - pi 8^2
+    3798.94 mm2
+    >>> [(len(one.sides), one.inner, one.outer) for one in plate.rounds]
+    [(4, '', None), (4, None, '')]
+    >>> plate.part_at((0.01, 0.01)), plate.part_at((0.05, 0.02))
+    ('', None)
+    >>> core = st.Hole.circle(("50 mm", "20 mm"), "8 mm", part="core")
+    >>> st.Shape.rectangle("100 mm", "40 mm", holes=[core]).parts
+    ('core',)
     """
 
     name: str
@@ -668,15 +654,7 @@ class Shape:
 
     @cached_property
     def rounds(self) -> tuple[Round, ...]:
-        """The outline and those of holes, each counter-clockwise; empty for a mesh file.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
-        >>> [(len(one.sides), one.inner, one.outer) for one in plate.rounds]
-        [(4, '', None), (4, None, '')]
-        """
+        """The outline and those of holes, each counter-clockwise; empty for a mesh file."""
         if not self.outline:
             return ()
         holes = []
@@ -703,78 +681,35 @@ class Shape:
         -------
         str or None
             Empty in the main part.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
-        >>> plate.part_at((0.01, 0.01)), plate.part_at((0.05, 0.02))
-        ('', None)
         """
         around = [one for one in self.rounds if winds_about(one.sides, point)]
         return min(around, key=lambda one: one.area).inner if around else None
 
     @cached_property
     def area(self) -> float:
-        """Area of the body [m2], exact for arcs; NaN for a mesh file.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.Shape.rectangle("100 mm", "40 mm").area
-        0.004
-        """
+        """Area of the body [m2], exact for arcs; NaN for a mesh file."""
         return sum(one.area * (one.outer is None) - one.area * (one.inner is None) for one in self.rounds) or math.nan
 
     @cached_property
     def extent(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner of the bounding box [m]; NaN for a mesh file.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.Shape.rectangle("100 mm", "40 mm").extent
-        ((0.0, 0.0), (0.1, 0.04))
-        """
+        """Lower left and upper right corner of the bounding box [m]; NaN for a mesh file."""
         nowhere = math.nan, math.nan
         return extent(self.rounds[0].sides) if self.rounds else (nowhere, nowhere)
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Names of the groups of its sides, each once; empty for a mesh file.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.Shape.rectangle("100 mm", "40 mm").groups
-        ('lower', 'right', 'upper', 'left')
-        """
+        """Names of the groups of its sides, each once; empty for a mesh file."""
         rounds = [self.outline, *(hole.outline for hole in self.holes)]
         return tuple(dict.fromkeys(one.group for sides in rounds for one in sides if one.group))
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Names of the parts that fill holes, each once.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> core = st.Hole.circle(("50 mm", "20 mm"), "8 mm", part="core")
-        >>> st.Shape.rectangle("100 mm", "40 mm", holes=[core]).parts
-        ('core',)
-        """
+        """Names of the parts that fill holes, each once."""
         return tuple(dict.fromkeys(hole.part for hole in self.holes if hole.part))
 
     @property
     def label(self) -> str:
-        """Name and size, for titles; only the name for a mesh file.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> st.Shape.rectangle("100 mm", "40 mm", name="plate").label
-        'plate (100 x 40 mm)'
-        """
+        """Name and size, for titles; only the name for a mesh file."""
         (left, low), (right, high) = self.extent
         return beam_label(self.name, right - left, high - low)
 

@@ -28,12 +28,11 @@ class BestSprings(Tabled):
     mesh : Mesh
         With the bonds of second neighbours, if asked for.
     material : Material
-    thickness : float
-        [m]
-    negative : bool
-        Whether negative stiffnesses were allowed.
-    energy_error : float
-        Worst error of the energy [1] over all loads of the fitted space: polynomial stresses up to cubic ones.
+    thickness, negative : float, bool
+        As they were given; the thickness in m.
+    energy_error, further_error : float
+        Worst error of the energy [1] over all loads of the fitted space, polynomial stresses up to cubic ones, and
+        under quartic and quintic ones.
     displacement_error : float
         Worst error of the displacement field there [1], root mean square over that of the load, of which a hundredth of
         the largest load's counts at least.
@@ -44,10 +43,8 @@ class BestSprings(Tabled):
     lower_bound : float or None
         Proven: no stiffnesses >= 0 on this mesh have a smaller `stretch_error` [1]. None where negative ones are
         allowed.
-    objectives : dict of str to float
+    objectives, seconds : dict of str to float, float
         What the search minimised [1], by its start: searches that agree may be near the best there is.
-    seconds : float
-        That the searches took.
 
     Examples
     --------
@@ -103,9 +100,7 @@ def best_springs(
     starts: Sequence[str] = START_DEFINITIONS,
     evaluations: int = EVALUATIONS,
 ) -> BestSprings:
-    """Search for the stiffness of each spring with the least error over a space of loads and the field inside.
-
-    Loads, objective and the proof of the bound: `springtune.springs.best_springs`.
+    """Search for the stiffnesses with the least error over a space of loads, see `springtune.springs.best_springs`.
 
     Parameters
     ----------

@@ -74,13 +74,11 @@ class Curve(Tabled):
         Why some are not stable; empty where all are.
     best_stiffness : float
         Stiffness of the stable equilibrium without error [N/m]; NaN without one.
-    best_status : Status
-    best_message : str
+    best_status, best_message : Status, str
         Why `best_stiffness` is NaN.
     predicted_stiffness : float
         By closed form [N/m], see `springtune.springs.lattice.predicted_stiffness`; NaN for loads that have none.
     title : str
-        Beam and load.
 
     Examples
     --------
@@ -122,7 +120,6 @@ class Curve(Tabled):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; on new axes without.
 
         Returns
         -------
@@ -132,10 +129,7 @@ class Curve(Tabled):
 
 
 def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Curve:
-    """Displacement of a scene over uniform stiffness, and where it meets the reference.
-
-    A network of one stiffness k under a force F deforms by F / k alone, so one equilibrium path serves all stiffnesses;
-    see `springtune.mechanics.series`.
+    """Displacement of a scene over uniform stiffness, and where it meets the reference; see `mechanics.series`.
 
     Parameters
     ----------
@@ -147,7 +141,6 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     Returns
     -------
     Curve
-        By ascending stiffness.
 
     Raises
     ------

@@ -237,14 +237,10 @@ class Identified(Tabled):
     Attributes
     ----------
     law : str
-    values : dict of str to float
-        Moduli in Pa; assumed where the tests do not tell.
-    intervals : dict of str to (float, float)
-        Intervals of 95 %; NaN for known or undetermined constants.
-    undetermined : tuple of str
-        Constants that the tests do not determine.
-    notes : tuple of str
-        Undetermined constants with the remedy, and signs that the model does not fit.
+    values, intervals : dict of str to float, dict of str to (float, float)
+        Moduli in Pa, assumed where the tests do not tell, and 95 % intervals; NaN if known or undetermined.
+    undetermined, notes : tuple of str
+        Constants that the tests do not determine, with the remedy, and signs that the model does not fit.
     noise : dict of str to float
         Noise of each column or field, estimated [m].
     residuals : dict of str to ndarray of float
@@ -292,7 +288,6 @@ class Identified(Tabled):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; on new axes without.
 
         Returns
         -------

@@ -19,16 +19,12 @@ class Moduli:
 
     Attributes
     ----------
-    young_modulus_error : float
-        Young's modulus along x over the material's, less one [1].
+    young_modulus_error, shear_modulus_error : float
+        Young's modulus along x, and shear modulus, over the material's, less one [1].
     poisson_ratio : float
-        Poisson's ratio there [1].
-    shear_modulus_error : float
-        Shear modulus over the material's, less one [1].
-    springs : Springs
-        Of a sheet that is 1 m thick: moduli do not depend on the thickness.
-    seconds : float
-        That deriving the springs took.
+        Poisson's ratio along x [1].
+    springs, seconds : Springs, float
+        Of a sheet that is 1 m thick: moduli do not depend on the thickness; and what deriving them took.
     mesh : Mesh
     material : Material or AnisotropicMaterial
 
@@ -105,17 +101,15 @@ class MeshModuli:
 def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
     """Measure the effective moduli of a definition on a mesh, by patch tests with an even strain.
 
-    Young's modulus and Poisson's ratio are those of a strip whose ends are moved apart and slide; where the mesh is no
-    strip, means over all directions under affine displacements of the outline. The shear modulus is of even shear of
-    the outline. See `springtune.mechanics.moduli`. Rows of triangles that are stretched to fit a box are not isotropic.
+    Young's modulus and Poisson's ratio are those of a strip whose ends slide; of other meshes means over all
+    directions, see `springtune.mechanics.moduli`. Rows of triangles that are stretched to fit a box are not isotropic.
 
     Parameters
     ----------
     mesh : Mesh
     material : Material or AnisotropicMaterial
-        What the springs are derived from.
     definition : str, Definition or callable
-        Key of `springtune.springs.DEFINITIONS`, or a function (mesh, material, thickness) -> Springs.
+        As of `Scene`.
 
     Returns
     -------

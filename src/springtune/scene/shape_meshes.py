@@ -17,8 +17,7 @@ from .meshes import A_SHAPE, is_a
 def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | str] | None = None) -> GroupedMesh:
     """Mesh a shape, with the groups of its sides, its points and parts.
 
-    Each side is divided into equal edges no longer than the size, an arc into at least six edges a full turn with its
-    particles on the arc; near much shorter ones, edges are divided further. All named points are particles.
+    An arc has at least six edges a full turn; near much shorter ones, edges are divided further.
 
     Parameters
     ----------
@@ -48,12 +47,10 @@ def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | st
 def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
     """Read the mesh of a shape with its groups, of any format that meshio knows.
 
-    Groups are Gmsh's physical groups, sets of cells and of points in Abaqus and other files, and arrays of zeros and
-    ones in VTU; the guide on mesh files says how each becomes sides, a point or a part.
-
     Parameters
     ----------
     path : str or Path
+        The guide on mesh files says how a group of the file becomes sides, a point or a part.
     unit : float or str, optional
         Unit of the coordinates in the file [m], or a text such as ``"1 mm"``.
 

@@ -64,32 +64,19 @@ class Scene(Tabled):
 
     Attributes
     ----------
-    sheet : MeshCache
-        What scenes of the same mesh and thickness can share.
     boundary_problem : BeamProblem or ShapeProblem
         Supports, forces, quantities and reference, see `springtune.scene.boundary_problem`.
-    definition : Definition
     uniform_stiffness : float or None
         The stiffness that was given [N/m].
-    force : float
-        Of a beam, with the sign that its load gives it [N].
-    kind : LoadKind
-        Of a beam's load.
-    follower : bool
-        Of a beam: whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
-    shape : Shape
-    grouped : GroupedMesh
-        Of a shape.
-    by_part : dict of str to Material
-        Of a shape.
-    case : LoadCase
-        Of a shape, with `scale` in it.
+    force, kind, follower : float, LoadKind, bool
+        Of a beam: the force with its load's sign [N], and whether it turns and grows with its side, if nonlinear.
+    shape, grouped, by_part, case : Shape, GroupedMesh, dict of str to Material, LoadCase
+        Of a shape; the case with `scale` in it.
 
     Raises
     ------
     ValueError
-        If an argument is unknown or out of its range, or the mesh does not fill the beam; the message says which one
-        and what to give.
+        If an argument is unknown or out of its range, or the mesh does not fill the beam.
 
     Notes
     -----
@@ -246,7 +233,6 @@ class Scene(Tabled):
         Returns
         -------
         Result
-            Its status says whether there is one and whether it is stable.
 
         Raises
         ------
@@ -276,11 +262,7 @@ class Scene(Tabled):
 
     @property
     def finite_strain(self) -> bool:
-        """Whether the reference is one at finite strain, of the network's own law.
-
-        That of a nonlinear `neo-hooke` or `yeoh` network; on a shape also that of `delingette` where small strain does
-        not apply.
-        """
+        """Whether the reference is at finite strain: of nonlinear `neo-hooke`, `yeoh`, on shapes also `delingette`."""
         return bool(self._law)
 
     @cached_property
@@ -332,10 +314,7 @@ class Scene(Tabled):
 
     @property
     def objection(self) -> str:
-        """Why a small-strain reference does not apply to the network.
-
-        Empty where it does, as in linear kinematics, and where the reference is one at finite strain.
-        """
+        """Why a small-strain reference does not apply to the network; empty where it does, or is at finite strain."""
         return "" if self.kinematics == "linear" or self.finite_strain else self.boundary_problem.objection()
 
     def motion(self, released: bool = False, **options: Any) -> "Motion":
@@ -395,7 +374,6 @@ class Scene(Tabled):
         Returns
         -------
         list of Path
-            What was written.
 
         Raises
         ------
@@ -468,10 +446,8 @@ class Result(Tabled):
     scene : Scene
     equilibrium : Equilibrium or None
         What the solve found, over the reference stiffness.
-    status : Status
-        Whether there is an equilibrium and whether it is stable.
-    message : str
-        Why it is not solved; empty where it is solved.
+    status, message : Status, str
+        Whether there is a stable equilibrium, and else why not.
     negative_pivots : int or float
         Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
     displacement : float
@@ -579,11 +555,7 @@ class Result(Tabled):
 
     @property
     def error(self) -> float:
-        """Signed deformation error against the reference, (network - reference) / abs(reference) [1].
-
-        At finite strain where the network has a law for it (`Scene.finite_strain`); for others `Scene.objection` says
-        where the reference of small strain does not apply.
-        """
+        """Signed error (network - reference) / abs(reference) [1]; see `Scene.finite_strain`, `Scene.objection`."""
         return next(iter(self.errors.values()))
 
     @property
@@ -593,10 +565,7 @@ class Result(Tabled):
 
     @property
     def sign_word(self) -> str:
-        """Sign of `error` in words: ``"too soft"`` or ``"too stiff"``; empty without an error.
-
-        Of a quantity other than a displacement ``"too large"`` or ``"too small"``.
-        """
+        """Sign of `error` in words: "too soft" or "too stiff", "too large" or "too small"; empty without an error."""
         return next(iter(self.sign_words.values()))
 
     @property
@@ -618,7 +587,6 @@ class Result(Tabled):
         Returns
         -------
         list of Path
-            What was written.
 
         Raises
         ------
@@ -636,7 +604,6 @@ class Result(Tabled):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; on new axes without.
 
         Returns
         -------

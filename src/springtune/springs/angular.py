@@ -26,8 +26,6 @@ from .lattice import half_weight
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs for the bulk modulus and angular springs for the rest (Keating): any nu on lattices, no tuning.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: Keating and Kirkwood, reviewed by Ostoja-Starzewski, Appl. Mech. Rev. 55:35, 2002 (abstract, derived).
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`

@@ -91,13 +91,11 @@ class Definition(Declaration):
 
     Attributes
     ----------
-    name : str
-        Label in a study and in the dataset.
+    name, order : str, float
+        Label in a study and in the dataset, and its place in the order of labels.
     function : callable
         Its formula: (mesh, material, thickness), and what it `needs`, -> `Springs`. The material has the constants of
         its plane, see `springtune.Material.in_plane`.
-    order : float
-        Place in the order of labels.
     uniform : bool
         Whether all springs have one stiffness, which is then reported.
     cells : tuple of int
@@ -124,6 +122,12 @@ class Definition(Declaration):
     ((3, 4), False, True, 'stiffness')
     >>> lattice.summary
     'Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3'
+    >>> [st.DEFINITIONS[name].law for name in ("neo-hooke", "delingette", "lattice")]
+    ['rubber', 'st-venant', '']
+    >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
+    >>> found = lattice.springs(mesh, st.Material("210 GPa", 0.3), thickness=1e-3)
+    >>> print(f"{found.reference:.4g} N/m, sqrt(3)/2 E t = {3**0.5 / 2 * 210e9 * 1e-3:.4g} N/m")
+    1.819e+08 N/m, sqrt(3)/2 E t = 1.819e+08 N/m
     """
 
     uniform: bool
@@ -137,14 +141,7 @@ class Definition(Declaration):
 
     @property
     def law(self) -> str:
-        """Law at finite strain, ``"rubber"`` (that of the material), ``"st-venant"`` or none.
-
-        Examples
-        --------
-        >>> import springtune as st
-        >>> [st.DEFINITIONS[name].law for name in ("neo-hooke", "delingette", "lattice")]
-        ['rubber', 'st-venant', '']
-        """
+        """Law at finite strain, ``"rubber"`` (that of the material), ``"st-venant"`` or none."""
         return "rubber" if self.finite_strain else "st-venant" if self.st_venant else ""
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
@@ -167,16 +164,6 @@ class Definition(Declaration):
         ------
         DefinitionError
             If the definition does not support the mesh or the material.
-
-        Examples
-        --------
-        An edge inside a lattice of equilateral triangles has sqrt(3)/2 E t:
-
-        >>> import springtune as st
-        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
-        >>> found = st.DEFINITIONS["lattice"].springs(mesh, st.Material("210 GPa", 0.3), thickness=1e-3)
-        >>> print(f"{found.reference:.4g} N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = {3 ** 0.5 / 2 * 210e9 * 1e-3:.4g}")
-        1.819e+08 N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = 1.819e+08
         """
         if not isinstance(mesh, Mesh):
             raise DefinitionError(f"mesh: {mesh!r} is not a Mesh; give a springtune.Mesh")

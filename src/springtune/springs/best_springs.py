@@ -118,10 +118,7 @@ class LoadSpace:
         return network, factor
 
     def misses(self, stiffness: np.ndarray, slope: bool = False) -> tuple[np.ndarray, ...]:
-        """Return misfits of energies, stretches and displacements; with `slope` the gradient of their squares.
-
-        Raises SingularError where the network is unstable.
-        """
+        """Return misfits of energies, stretches and displacements; with `slope` the gradient of their squares."""
         network, factor = self._factorized(stiffness)
         moved = factor.solve(self.forces)
         fields = [network.expand(field) for field in moved.T]
@@ -140,11 +137,7 @@ class LoadSpace:
         return energies, off, apart, -((2 * stretches @ energies + adjoint) * stretches).sum(axis=1)
 
     def errors(self, stiffness: np.ndarray) -> tuple[float, float, float, float]:
-        """Worst errors [1] over all loads of the space: of the energy, of the displacements and of a spring's stretch.
-
-        The stretch's is over the largest one that its spring has under a load of the same energy. The fourth is of the
-        energy under quartic and quintic stresses, which are not in the space.
-        """
+        """Worst errors [1] over all loads of the space: of energy, displacements, a spring's stretch, and unfitted energy."""
         energies, off, apart = self.misses(stiffness)
         others = self._reduced(polynomial_tests(self.mesh, self.nu, range(5, 7))[0])
         further = others.T @ self._factorized(stiffness)[1].solve(others) - np.eye(others.shape[1])
@@ -189,11 +182,7 @@ class LoadSpace:
 
 
 def delta_of(normals: np.ndarray, wanted: np.ndarray, force: np.ndarray) -> float:
-    """Delta that one particle proves, 0 if it proves none.
-
-    `normals` (n, 2) of its springs point to it, `wanted` (n, n_tests) are their stretches of size 1, `force` (2,
-    n_tests) acts on it.
-    """
+    """Delta that one particle proves, or 0, by `normals` of springs to it, their `wanted` stretches, and its `force`."""
     from scipy.optimize import minimize, nnls  # here: see `springtune.springs`
 
     rows = np.linalg.svd(np.concatenate([wanted, force]), full_matrices=False)

@@ -14,10 +14,7 @@ from .base import Springs, definition
 
 
 def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
-    """Return the mean of the best stiffnesses of curves [N/m].
-
-    Each has a name, its best stiffness [N/m] or NaN, and the reason for NaN.
-    """
+    """Return the mean of the best stiffnesses [N/m] of curves, each with a name and, for NaN, a reason."""
     curves = list(curves)
     if not curves:
         raise ValueError("there is no sensitivity curve of the calibration beam")

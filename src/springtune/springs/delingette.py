@@ -33,8 +33,6 @@ from .base import Springs, definition, membrane_stiffness, triangles_only
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles of any material.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: Delingette, IEEE TVCG 14(2):329, 2008, and SOFA's code; any anisotropy is ours (read, derived).
     """
     return _springs(mesh, material, thickness, coupled=True)
@@ -43,8 +41,6 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
 @definition("delingette-tensile", order=180, cells=(3,), anisotropic=True)
 def tensile(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """The tensile part of Delingette's springs alone: what is left without coupling.
-
-    Raises DefinitionError on quadrilaterals.
 
     Source: Delingette, IEEE TVCG 14(2):329, 2008, and SOFA's code (read).
     """

@@ -80,10 +80,10 @@ def _fit(here: np.ndarray, pairs: tuple[tuple[int, int], ...], matrices: np.ndar
 
 
 def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the non-negative springs k of each cell that minimise ``k . products . k - 2 wanted . k``.
+    """Return the springs k >= 0 of each cell that minimise ``k . products . k - 2 wanted . k``.
 
-    `products` (n_cells, n_springs, n_springs) are scalar products of unit springs' effects, `wanted` (n_cells,
-    n_springs) those with the wanted effect.
+    `products` (n_cells, n_springs, n_springs) are of unit springs' effects, `wanted` (n_cells, n_springs) with the
+    wanted.
     """
     pairs = wanted.shape[1]
     # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.

@@ -25,10 +25,7 @@ SPAN = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A load and its wanted displacements.
-
-    `held` (n_points, 2) are fixed directions, `forces` (n_points, 2) in N, `displacements` (n_points, 2) in m.
-    """
+    """A load [N] and its wanted displacements [m], with `held` directions; all arrays are (n_points, 2)."""
 
     held: np.ndarray
     forces: np.ndarray
@@ -46,10 +43,7 @@ def tested_body(mesh: Mesh) -> np.ndarray:
 
 
 def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Case]:
-    """Return tension along x and y and shear of the free mesh under even tractions; exact displacements are known.
-
-    `thickness` is in m.
-    """
+    """Return tension along x and y and shear of the free mesh under even tractions; exact displacements are known."""
     from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
 
     tested_body(mesh)

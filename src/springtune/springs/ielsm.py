@@ -38,8 +38,6 @@ from .base import NO_STIFFNESS, Springs, definition, triangles_only
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Axial and rotational springs that decompose an area constraint (after IELSM 2026): any nu, any triangles.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: Li and He, arXiv 2605.15209, 2026 (abstract, derived).
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`

@@ -31,8 +31,6 @@ COEFFICIENT = math.sqrt(3) / 2
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3.
 
-    `thickness` is t [m].
-
     Source: textbook form of the equilateral lattice, with half weight on the outline (derived).
     """
     return Springs(COEFFICIENT * material.young_modulus * thickness, half_weight(mesh))

@@ -36,8 +36,6 @@ from .lattice import COEFFICIENT, half_weight
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs, and the volume factor of LAMMPS on each triangle: any nu on lattices, no tuning.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: LAMMPS's manual, ``bond_style bpm/spring``; the form on triangles is ours (read, derived).
     """
     from ..mechanics.energies import BiquadraticEnergy  # here: see `springtune.springs`

@@ -26,8 +26,6 @@ from .base import Springs, definition, triangles_only
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of zero rest length and areas: equal to linear triangles of neo-Hookean rubber, any nu, any strain.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: linear triangles of the textbook law (derived).
     """
     from ..mechanics.energies import NeoHookeEnergy, YeohEnergy  # here: see `springtune.springs`

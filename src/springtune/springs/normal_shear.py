@@ -37,8 +37,6 @@ from .base import Springs, definition, triangles_only
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Normal springs, and shear springs of the local strain (after Zhao 2011): any nu on lattices, no tuning.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: Zhao, Int. J. Numer. Anal. Methods Geomech. 35:859, 2011 (abstract, derived).
     """
     from ..mechanics.energies import BiquadraticEnergy  # here: see `springtune.springs`

@@ -14,8 +14,6 @@ from .lattice import uniform
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float, stiffness: float) -> Springs:
     """Uniform stiffness as printed: the value that the study states for a mesh type and material.
 
-    `stiffness` is in N/m.
-
     Source: the paper that is reproduced, its tables 1 to 5 (read).
     """
     return Springs(stiffness, uniform(mesh))

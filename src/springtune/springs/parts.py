@@ -30,10 +30,7 @@ def derive_by_parts(
     thickness: float,
     given: object = None,
 ) -> Springs:
-    """Return the springs of a body with parts of several materials; `thickness` in m.
-
-    `definition` is one of the package or the user's own; `materials` has one for each part that has cells.
-    """
+    """Return the springs of a body with parts of several materials, by a definition of the package or the user's own."""
     mesh, labels = grouped.mesh, part_names(grouped)
     groups: dict[AnyMaterial, list[str]] = {}
     for name in ("", *grouped.parts):
@@ -98,10 +95,7 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
 
 
 def _law(energy: Any) -> tuple[object, ...]:
-    """Return what energies of one kind must share to be joined: numbers of cells, and values a cell.
-
-    Rubber laws may differ in their terms and in their range of data.
-    """
+    """Return what energies of one kind must share to be joined; rubber laws may differ in terms and range of data."""
     values = [value for name, value in energy.moduli.items() if name not in ("coefficients", "largest")]
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 

@@ -102,10 +102,9 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 
 def outline_tests(mesh: Mesh) -> np.ndarray:
-    """Return forces on the particles of at most `TESTS` tests with polynomial stresses, (n_tests, n_points, 2).
+    """Return forces on the particles of at most `TESTS` tests with polynomial stresses, (n_tests, n_points, 2), E t = 1.
 
-    For E t = 1: times the square root of E t they are forces [N] whose work on their own displacements in the sheet
-    is 1 J, and 0 on those of the others.
+    Times the square root of E t they are in N, with a work of 1 J on their own displacements and 0 on the others'.
     """
     return polynomial_tests(mesh)[0]
 
@@ -113,10 +112,7 @@ def outline_tests(mesh: Mesh) -> np.ndarray:
 def polynomial_tests(
     mesh: Mesh, nu: float = NU, degrees: range = range(1, TEST_DEGREE + 1)
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return forces as `outline_tests` and the displacements of the particles, both of shape (n_tests, n_points, 2).
-
-    Displacements are polynomials of some `degrees`, in a sheet of any Poisson's ratio.
-    """
+    """Return forces as `outline_tests`, and displacements of the particles that are polynomials of some `degrees`."""
     x, y = (mesh.points - mesh.points.mean(axis=0)).T
     places = (x + 1j * y) / np.hypot(x, y).max()
     # Sides of triangles run counter-clockwise around them: those of the outline have the sheet on their left.

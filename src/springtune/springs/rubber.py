@@ -24,8 +24,8 @@ FLAT = 2.0
 class SpringLaw:
     """One law for all springs of an equilateral lattice, and its response in the three tests.
 
-    A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per cross-section of its rows, p of `LAW_POWERS`.
-    `coefficients` are a_p [Pa]; `largest` is the largest stretch in the fitted data [1], below `FLAT`.
+    A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per cross-section of its rows, p of `LAW_POWERS`, with the
+    `coefficients` a_p [Pa]; `largest` is the largest stretch in the fitted data [1], below `FLAT`.
     """
 
     coefficients: tuple[float, ...]

@@ -36,8 +36,6 @@ def _shapes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the form for nu = 0 (Van Gelder 1998): exact on lattices with no tuning.
 
-    Raises DefinitionError on quadrilaterals.
-
     Source: Van Gelder, J. Graphics Tools 3(2), 1998, its abstract and public code that cites it (read).
     """
     areas, squares = _shapes(mesh)

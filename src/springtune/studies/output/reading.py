@@ -41,10 +41,8 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
     Raises
     ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is not the dataset of a study.
+    FileNotFoundError, ValueError
+        If there is no such file, or it is not the dataset of a study.
 
     Examples
     --------

@@ -215,10 +215,8 @@ def info(path: str | os.PathLike[str]) -> Info:
 
     Raises
     ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is not the dataset of a study.
+    FileNotFoundError, ValueError
+        As of `open`.
 
     Examples
     --------

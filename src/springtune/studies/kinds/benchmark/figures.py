@@ -43,9 +43,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/benchmark``.
     ax : Axes or Figure, optional
-        Where to plot; by default a new figure.
     scene : str, optional
-        Scene; optional if there is only one.
 
     Returns
     -------

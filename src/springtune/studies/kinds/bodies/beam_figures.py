@@ -59,9 +59,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/sensitivity`` (then without force, reference and what the paper prints).
     ax : Axes or Figure, optional
-        Where to plot; by default a new figure.
     beam, mesh_type, material, load, kinematics : str, optional
-        Labels of the curves. One that is not given must leave no choice.
 
     Returns
     -------
@@ -230,16 +228,13 @@ def plot_deformed(
     data : xarray.DataTree
         A study's dataset with the group ``/fields``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as beams; by default a new figure.
     beam : str, optional
         One beam in place of all.
     mesh_type, material, load, definition, kinematics : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_beams,)
-        One a beam.
 
     Raises
     ------
@@ -377,16 +372,13 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its root.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as beams; by default a new figure.
     beam : str, optional
         One beam in place of all.
     mesh_type, material, load, kinematics : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_beams,)
-        One a beam.
 
     Raises
     ------
@@ -472,7 +464,6 @@ def plot_sweep(
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its root.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as beams; by default a new figure.
     parameter : str
         ``"force"``, ``"thickness"``, ``"young_modulus"``, ``"poisson_ratio"`` or ``"stiffness_scale"``. Of the others
         that are swept each beam shows values under which this one has most; of several the largest force, under it
@@ -482,7 +473,6 @@ def plot_sweep(
     mesh_size : float, optional
         [m]; without, of each beam the one that has most values, the finest of several.
     mesh_type, material, load, kinematics : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
 
     Returns
     -------
@@ -608,9 +598,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     data : xarray.DataTree
         A study's dataset with the group ``/block``; the first panel needs ``/sensitivity``, too.
     ax : Figure or sequence of two Axes, optional
-        Where to plot; by default a new figure.
     beam, mesh_type, material : str, optional
-        Labels of the scene. One that is not given must leave no choice.
     mesh_size : float, optional
         Likewise [m].
 

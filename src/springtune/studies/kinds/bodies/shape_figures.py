@@ -50,7 +50,6 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/shapes``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: two Axes a quantity; by default a new figure.
     shape, load, material, kinematics : str, optional
         Labels of the scenes; of materials and kinematics the first ones without. Others that are not given must leave
         no choice.
@@ -181,7 +180,6 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/shapes``.
     ax : Axes or Figure, optional
-        Where to plot; by default a new figure.
     material, kinematics : str, optional
         Labels of the scenes; of each shape and load the first ones without.
 
@@ -259,9 +257,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     data : xarray.DataTree
         A study's dataset with the group ``/shape_fields``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as definitions; by default a new figure.
     shape, load : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
     definition : str or list of str, optional
         Definitions in the place of a few, of which those that have an answer come first.
 

@@ -48,9 +48,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/engines``.
     ax : Axes or Figure, optional
-        Where to plot; by default a new figure.
     scene : str, optional
-        Scene; optional if there is only one.
 
     Returns
     -------
@@ -108,9 +106,7 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/engine_curves``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as panels; by default a new figure.
     scene : str, optional
-        Scene; optional if there is only one.
 
     Returns
     -------

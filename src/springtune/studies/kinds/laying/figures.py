@@ -24,7 +24,6 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/laying``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: three Axes per row; by default a new figure.
     loading : str, optional
         Show this loading only.
     friction : float, optional
@@ -33,7 +32,6 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_rows, 3)
-        Shape, area error and elongation of each loading and friction.
 
     Raises
     ------

@@ -31,12 +31,10 @@ def plot_moduli(data, ax=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/moduli``.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as mesh types; by default a new figure.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
-        One per mesh type.
 
     Raises
     ------
@@ -91,16 +89,13 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its root.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as materials; by default a new figure.
     beam, mesh_type, kinematics : str, optional
-        Labels of the scenes; optional if there is only one.
     materials : sequence of str, optional
         By default three of those with most scenes, from the lowest to the highest Poisson's ratio.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_materials,)
-        One per material.
 
     Raises
     ------

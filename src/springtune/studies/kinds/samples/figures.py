@@ -27,9 +27,7 @@ def plot_sobol(data, ax=None, *, load=None):
     data : xarray.DataTree
         A study's dataset.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as there are quantities and definitions; by default a new figure.
     load : str, optional
-        Load; optional if there is only one.
 
     Returns
     -------

@@ -46,7 +46,6 @@ def plot_stability_maps(data, ax=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/stability``.
     ax : Figure or sequence of Axes, optional
-        Where to plot; by default a new figure.
 
     Returns
     -------
@@ -100,12 +99,10 @@ def plot_stability_strains(data, ax=None):
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its group ``/stability``.
     ax : Figure or sequence of Axes, optional
-        Where to plot; by default a new figure.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes, shape (n_loads,)
-        One per load.
 
     Raises
     ------
