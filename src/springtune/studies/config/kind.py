@@ -24,6 +24,9 @@ _FIRST = ("bodies", "moduli", "laying", "stability", "benchmark", "samples")
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
 
+VIEWS = "views.yaml"
+"""File of a study kind with its views on the page to browse."""
+
 FORMATS = ("png", "pdf")
 """Endings of a figure's files."""
 
@@ -129,6 +132,11 @@ def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]
     """Distinct selections of the dimensions `labels` among a study's cells, in order, by stem."""
     chosen = [{label: cell[label] for label in labels} for cell in cells]
     return {stem(name, one): one for one in chosen}
+
+
+def kind_files(name: str) -> list[Path]:
+    """Files of a name in the packages of the study kinds."""
+    return [path for kind in KINDS if (path := _PACKAGES / kind / name).is_file()]
 
 
 def modules(*names: str) -> list[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..config.kind import FORMATS, Output, kinds, modules, outputs
+from ..config.kind import FORMATS, VIEWS, Output, kind_files, kinds, modules, outputs
 from ..config.model import Study
 from .keys import stage_key
 from .plan import Job, plan
@@ -84,10 +84,9 @@ def _present_digest(members: Iterable[Output], files: list[str]) -> str:
 
 
 def _browse_digest(study: Study) -> str:
-    assets = {path.name: checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())}
-    return hash_of(
-        linked_files(study), [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))], assets
-    )
+    files = [*sorted((PACKAGE / "studies/output/browse/assets").iterdir()), *kind_files(VIEWS)]
+    assets = [(path.name, checksum(path)) for path in files]
+    return hash_of(linked_files(study), stage_key("studies.output.browse.page"), assets)
 
 
 def paper_job(source: Path, datasets: Iterable[Path], folder: Path) -> Job:

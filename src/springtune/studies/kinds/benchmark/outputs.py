@@ -1,7 +1,6 @@
 """Figures, tables and browse views of the benchmark."""
 
 from ...config.kind import Output
-from ...output.browse import Plot, View
 from . import PARTS
 
 OUTPUTS = (
@@ -14,21 +13,6 @@ OUTPUTS = (
     ),
 )
 
-VIEWS = (
-    View(
-        "/benchmark",
-        "Benchmark",
-        "Error against run time of every approach, meshing included; lower left is better.",
-        (
-            Plot("error over seconds", "error", "seconds", "approach", along="mesh_size", log="xy"),
-            Plot("assured error over seconds", "assured_error", "seconds", "approach", along="mesh_size", log="xy"),
-            Plot("seconds over unknowns", "seconds", "unknowns", "approach", along="mesh_size", log="xy"),
-            Plot("error over mesh size", "error", "mesh_size", "approach", log="xy"),
-            Plot("status of the cases", "status", "mesh_size", "approach", "map"),
-            Plot("springs per second of explicit steps", "spring_updates", "mesh_size", "thread_count", log="x"),
-        ),
-    ),
-)
 
 CASE_COLUMNS = {
     "mesh_size_mm": ("mesh_size", 1e3),

@@ -8,7 +8,6 @@ from springtune.problem.loads import LOADS
 from ...config.kind import Output, distinct
 from ...config.kind import stem as figure_stem
 from ...config.model import cache_by_study
-from ...output.browse import Plot, View, particle_plots
 
 if TYPE_CHECKING:
     from ...config.model import Study
@@ -172,100 +171,3 @@ OUTPUTS = (
         usual=True,
     ),
 )
-
-
-VIEWS = (
-    View(
-        "/",
-        "Scenes",
-        "All variables of the scenes, over any of their parameters.",
-        (
-            Plot("errors of definitions on mesh types", "deformation_error", "mesh_type", "definition", "map"),
-            Plot("errors of definitions under loads", "deformation_error", "load", "definition", "map"),
-            Plot("error over mesh size", "deformation_error", "mesh_size", "definition", log="xy"),
-            Plot("error of the whole field over mesh size", "field_error", "mesh_size", "definition", log="xy"),
-            Plot("error over seconds", "deformation_error", "solve_seconds", "definition", along="mesh_size",
-                 ascending=True, log="xy"),
-            Plot("seconds over particles", "solve_seconds", "particles", "definition", along="mesh_size", log="xy"),
-            Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
-        ),
-        ("deformation_error", "status", "displacement", "reference_displacement", "field_error", "stiffness",
-         "stiffness_inside", "stiffness_outline", "paper_deformation_error", "paper_displacement", "particles",
-         "solve_seconds", "residual", "message", "reference_message", "paper_remark"),
-    ),
-    View(
-        "/sensitivity",
-        "Curves",
-        "Sensitivity curves: error and displacement against one stiffness of all springs.",
-        (
-            Plot("error over stiffness", "deformation_error", "stiffness", "mesh_size", along="stiffness_ratio"),
-            Plot("displacement over stiffness", "displacement", "stiffness", "mesh_size", along="stiffness_ratio"),
-            Plot("error over stiffness, meshes of a type", "deformation_error", "stiffness_ratio", "mesh_type"),
-            Plot("best stiffness over mesh size", "best_stiffness", "mesh_size", "beam", log="x"),
-            Plot("predicted stiffness over mesh size", "predicted_stiffness", "mesh_size", "beam", log="x"),
-        ),
-    ),
-    View(
-        "/finite_strain",
-        "Finite strain",
-        "References at finite strain, and the errors of the networks against them.",
-        (
-            Plot("error against finite strain", "deformation_error", "mesh_size", "definition"),
-            Plot("errors of definitions under loads", "deformation_error", "load", "definition", "map"),
-            Plot("displacement of the references", "reference_displacement", "load", "reference"),
-        ),
-    ),
-    View(
-        "/block",
-        "Block",
-        "Bodies under pressure: displacements over the loaded face, and the error in its middle.",
-        (
-            Plot("displacement over the face", "face_profile", "face_position", "definition",
-                 beside=(("face_position", "reference_face_profile", "reference"),)),
-            Plot("error of the middle", "face_error", "mesh_size", "definition"),
-            Plot("errors of the middle by definition and load", "face_error", "load", "definition", "map"),
-            Plot("references over the face", "reference_face_profile", "face_position", "reference"),
-        ),
-    ),
-    View(
-        "/fields",
-        "Fields",
-        "Positions and displacements of all particles of the coarsest meshes; the view of scenes draws the networks.",
-        (
-            *particle_plots("outline of the reference"),
-            Plot("displacements of the outline", "reference_displacement_x", "outline_x", along="outline_point"),
-        ),
-    ),
-    View(
-        "/shapes",
-        "Shapes",
-        "Quantities of interest of bodies of any outline: networks beside converged references on the same shape, and "
-        "beside published values.",
-        (
-            *(Plot(words, value, x, "definition", along="mesh_size", ascending=True, log="xy") for words, value, x in (
-                ("error over particles", "error", "particles"),
-                ("error over seconds", "error", "solve_seconds"),
-                ("difference to published values", "expected_error", "particles"),
-            )),
-            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
-            Plot("errors of definitions on shapes", "error", "shape", "definition", "map"),
-            Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
-        ),
-    ),
-    View(
-        "/shapes_finite_strain",
-        "Shapes at finite strain",
-        "Errors of networks that have a law at finite strain, against references of that law.",
-        (
-            Plot("error over mesh size", "error", "mesh_size", "definition", log="xy"),
-            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
-            Plot("quantities of the references", "reference_value", "load", "law"),
-        ),
-    ),
-    View(
-        "/shape_fields",
-        "Networks of shapes",
-        "Positions and displacements of all particles, of each shape and load.",
-        particle_plots("outline"),
-    ),
-)  # fmt: skip

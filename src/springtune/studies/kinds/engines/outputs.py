@@ -1,7 +1,6 @@
 """Figures, table and browse views of runs in engines."""
 
 from ...config.kind import Output
-from ...output.browse import Plot, View
 
 
 def _figures(study):
@@ -19,32 +18,6 @@ OUTPUTS = (
     ),
 )
 
-VIEWS = (
-    View(
-        "/engines",
-        "Engines",
-        "Scenes in engines at rest: error and time of a frame by setting.",
-        (
-            Plot("error over iterations", "error", "iterations", "engine", log="xy"),
-            Plot("error over the time of a frame", "error", "frame_seconds", "engine", along="iterations", log="xy"),
-            Plot("error over substeps", "error", "substeps", "engine", log="xy"),
-            Plot("error by setting", "error", "iterations", "substeps", "map"),
-            Plot("how runs end", "engine_status", "iterations", "substeps", "map"),
-            Plot("error by engine and definition", "error", "engine", "definition", "map"),
-            Plot("time of a frame", "frame_seconds", "iterations", "engine", log="xy"),
-        ),
-    ),
-    View(
-        "/engine_curves",
-        "Engine curves",
-        "Sensitivity curves in engines: error by the factor on the typed stiffness.",
-        (
-            Plot("error over the typed factor", "error", "stiffness_factor", "engine", log="xy"),
-            Plot("error over the typed factor, by iterations", "error", "stiffness_factor", "iterations", log="xy"),
-            Plot("best factor over iterations", "best_factor", "iterations", "engine", log="xy"),
-        ),
-    ),
-)
 
 ENGINE_COLUMNS = {
     "dt_ms": ("dt", 1e3),

@@ -1,7 +1,6 @@
 """Figure, table and browse view of laid strips."""
 
 from ...config.kind import Output
-from ...output.browse import Plot, View
 
 OUTPUTS = (
     Output(
@@ -14,22 +13,6 @@ OUTPUTS = (
 )
 
 REFERENCE_LINES = (("reference_x", "reference_y", "finite elements"), ("trapezoid_x", "trapezoid_y", "trapezoid"))
-
-VIEWS = (
-    View(
-        "/laying",
-        "Laying",
-        "A strip laid on a trapezoid: outline, area below it, and elongation.",
-        (
-            Plot("outline of the strip", "strip_y", "strip_x", "definition", along="outline_point", equal=True,
-                 beside=REFERENCE_LINES),
-            Plot("error of the area", "area_error", "mesh_size", "definition"),
-            Plot("errors of the area by friction", "area_error", "friction", "definition", "map"),
-            Plot("elongation of the lower fibre", "elongation", "mesh_size", "definition"),
-            Plot("seconds", "laying_seconds", "mesh_size", "definition", log="xy"),
-        ),
-    ),
-)  # fmt: skip
 
 
 LAYING_COLUMNS = {

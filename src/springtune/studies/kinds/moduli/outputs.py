@@ -1,7 +1,6 @@
 """Figures, table and browse view that compare definitions."""
 
 from ...config.kind import Output
-from ...output.browse import Plot, View
 
 
 def _figures(study):
@@ -23,20 +22,6 @@ OUTPUTS = (
     ),
 )
 
-VIEWS = (
-    View(
-        "/moduli",
-        "Definitions",
-        "Effective moduli of each definition in a patch test: the network as a material.",
-        (
-            Plot("Poisson's ratio, effective over asked", "effective_poisson_ratio", "poisson_ratio", "definition"),
-            Plot("errors of Young's modulus on mesh types", "young_modulus_error", "mesh_type", "definition", "map"),
-            Plot("errors of the shear modulus on mesh types", "shear_modulus_error", "mesh_type", "definition", "map"),
-            Plot("error of Young's modulus over Poisson's ratio", "young_modulus_error", "poisson_ratio", "definition"),
-            Plot("seconds over mesh size", "definition_seconds", "mesh_size", "definition", log="xy"),
-        ),
-    ),
-)
 
 MESH_SIZES_OVER_HEIGHT = {0.05: "up to 0.05", 0.1: "0.05 to 0.1", float("inf"): "above 0.1"}
 """Largest mesh sizes over the height of the beam [1] of fine, middle and coarse meshes, and their texts."""

@@ -1,7 +1,6 @@
 """Figures, table and browse views of samples."""
 
 from ...config.kind import Output, stem
-from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
 
 QUANTITIES = {
@@ -36,34 +35,6 @@ OUTPUTS = (
 )
 
 ERROR_SELECTION = {"quantity": "deformation_error"}
-
-VIEWS = (
-    View(
-        "/samples",
-        "Samples",
-        "Scenes with random parameters, one point per scene.",
-        (
-            *(
-                Plot(f"error by {title}", "deformation_error", x, "definition", "points", along="sample")
-                for title, x in (
-                    ("mesh size", "sample_mesh_size"), ("height", "height"), ("Poisson's ratio", "poisson_ratio"),
-                )
-            ),
-            Plot("best stiffness by Young's modulus", "best_stiffness", "young_modulus", "", "points", along="sample",
-                 log="xy"),
-        ),
-    ),
-    View(
-        "/sobol",
-        "What matters",
-        "Sobol indices: share of a quantity's variance by each parameter alone, and with all its interactions.",
-        (
-            Plot("total order", "total_order", "parameter", "definition", "points", selection=ERROR_SELECTION),
-            Plot("first order", "first_order", "parameter", "definition", "points", selection=ERROR_SELECTION),
-            Plot("total order by quantity", "total_order", "parameter", "quantity", "map"),
-        ),
-    ),
-)  # fmt: skip
 
 
 def tables(tree):

@@ -32,16 +32,6 @@ class Plot:
     selection: Mapping[str, Label] = field(default_factory=dict)
 
 
-def particle_plots(outline: str) -> tuple[Plot, ...]:
-    """Plots of a network's particles: places at rest beside an outline of that name, and displacements."""
-    beside = (("outline_x", "outline_y", outline),)
-    return (
-        Plot("places of the particles at rest", "y", "x", "", "points", "particle", equal=True, beside=beside),
-        Plot("displacements along x", "displacement_x", "x", "definition", "points", "particle"),
-        Plot("displacements along y", "displacement_y", "x", "definition", "points", "particle"),
-    )
-
-
 @dataclass(frozen=True)
 class View:
     """View of a group: its `plots`, without missing variables, and table `columns` for the root."""

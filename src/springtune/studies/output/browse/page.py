@@ -20,16 +20,16 @@ from typing import Any
 import h5netcdf
 import jinja2
 import numpy as np
+import yaml
 from markupsafe import Markup
 
-from springtune.registry import import_name
 from springtune.safe_io.atomic import write_json, write_text
 
-from ...config.kind import modules
+from ...config.kind import VIEWS, kind_files
 from .. import reading
 from ..answers import broadcast
 from ..error_scale import ERROR_COLOURS, ERROR_RANGE, sign_of_displacements
-from . import View
+from . import Plot, View
 from .overview import FILTERS, GROUPS, REMARK, overview
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
@@ -40,8 +40,9 @@ BOKEH_SCRIPTS = ("bokeh", "bokeh-api")
 
 
 def views() -> dict[str, View]:
-    """Views that the study kinds declare."""
-    return {view.group: view for name in modules("outputs") for view in getattr(import_name(name), "VIEWS", ())}
+    """Views that the study kinds declare, by group."""
+    declared = [one for path in kind_files(VIEWS) for one in yaml.safe_load(path.read_text(encoding="utf-8"))]
+    return {one["group"]: View(**one | {"plots": tuple(Plot(**plot) for plot in one["plots"])}) for one in declared}
 
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
