@@ -33,7 +33,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 import springtune as st
 found = {
-    "place": springtune.__file__,
+    "place": st.__file__,
     "DEFINITIONS": {name: keys.definition_closure(name).digest for name in DEFINITIONS},
     "MESH_TYPES": {name: keys.mesh_type_closure(name).digest for name in MESH_TYPES},
     "light": not {"scipy", "h5py", "meshio", "netgen", "xarray", "pydantic"} & set(sys.modules),

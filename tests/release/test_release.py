@@ -24,6 +24,7 @@ WITHIN = re.compile(
     r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|studies/output/page\.html)"
     r"|springtune/cli/study_of_a_(beam|shape)\.yaml"
     r"|springtune/handover/templates/[\w.]+\.jinja"
+    r"|springtune/studies/kinds/\w+/\w+\.csv"
     r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
     r"|springtune/workflow/(Snakefile|README.md|config/.*|docs/.*|examples/.*|profiles/.*|workflow/.*)"
     r"|snakemake_logger_plugin_springtune/\w+\.py"
@@ -160,11 +161,11 @@ def test_no_package_is_missing_to_any_module(call):
     """Whatever the package imports is declared; what belongs to an extra is imported where it is used."""
     program = (
         "import importlib, pkgutil, springtune\n"
-        "for one in pkgutil.walk_packages(st.__path__, 'springtune.'):\n"
+        "for one in pkgutil.walk_packages(springtune.__path__, 'springtune.'):\n"
         "    if not one.name.endswith('__main__'):\n"
         "        importlib.import_module(one.name)\n"
         "import snakemake_logger_plugin_springtune\n"
-        "for name in st.__all__:\n"
+        "for name in springtune.__all__:\n"
         "    getattr(springtune, name)\n"
     )
     found = call("python", "-c", program)
@@ -194,7 +195,7 @@ def read_only(empty):
 def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, shape):
     """With Python alone: no clone, no git, and an environment that is only read."""
     before = {path: path.stat().st_mtime_ns for path in empty.parent.rglob("*")}
-    touch = "import pathlib, springtune; pathlib.Path(st.__file__).with_name('touched').touch()"
+    touch = "import pathlib, springtune; pathlib.Path(springtune.__file__).with_name('touched').touch()"
     assert "Permission denied" in call("python", "-c", touch, **read_only).stderr
     assert call("python", "-c", "import shutil; print(shutil.which('git'))", **read_only).stdout == "None\n"
     written = call("springtune", "new", "mine", *shape, **read_only)
