@@ -1,6 +1,8 @@
 """Imports of the whole source: their contracts, and what is light to import."""
 
 import ast
+import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -35,3 +37,31 @@ def test_what_is_used_alone_does_not_import_what_is_heavy(program, heavy):
     program = f"import sys; {program}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
     assert not set(heavy.split()) & set(done.stdout.splitlines()[-1].split())
+
+
+ROOT = Path(__file__).parents[1]
+TIGHT = re.compile(r"(?:<=?\s*|>=?\s*|\+ |- |\b[ar]tol=|_tol=|rel=|abs=|clip\()\d(?:\.\d+)?e-(?:1\d|2\d)\b")
+COMPARES = re.compile(r"\bassert\b|approx\(|allclose|\b[ar]tol=|rel_tol=")
+
+
+def compared(path):
+    """Lines of a test, a page, an example or a docstring's example that compare numbers."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        text = "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if cell["cell_type"] == "code")
+    for number, line in enumerate(text.splitlines(), 1):
+        if COMPARES.search(line) if path.suffix == ".ipynb" or "src" not in path.parts else ">>>" in line:
+            yield number, line
+
+
+def test_no_comparison_is_tighter_than_rounding_on_another_processor():
+    """What is exact by construction says why on its line."""
+    paths = [path for folder in ("tests", "src", "docs", "examples") for path in (ROOT / folder).rglob("*")]
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in sorted(paths)
+        if path.suffix in (".py", ".md", ".ipynb") and path != Path(__file__)
+        for number, line in compared(path)
+        if TIGHT.search(line) and "exact" not in line
+    ]
+    assert not found, "\n".join(found)

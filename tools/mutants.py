@@ -40,8 +40,8 @@ MODULES = ("springs/*.py", "mechanics/*.py", "reference/*.py", "mesh/*.py", "stu
 TESTS = (
     *(f"tests/{room}" for room in ("problem", "mesh", "springs", "mechanics", "linalg", "reference", "scene")),
     *("tests/prediction", "tests/handover", "tests/engines", "tests/studies/kinds/test_benchmark.py"),
-    *("tests/test_refused_calls.py", "tests/docs/test_which_numbers.py", "tests/docs/test_benchmarks_of_others.py"),
-    *("tests/studies/runs/test_keys.py", "tests/studies/output/test_labels.py", "tests/test_places.py"),
+    *("tests/test_refused_calls.py", "tests/docs/test_which_numbers.py"),
+    *("tests/studies/runs/test_keys.py", "tests/test_places.py"),
 )
 """What may find a mutant: tests that are not slow, and that run in one process."""
 

@@ -18,7 +18,7 @@ from springtune.prediction import choices as of_one_mesh
 from springtune.problem.geometry import AssumptionWarning
 from springtune.studies.config.sections import schema_text
 
-from tables import STUDIES, run
+from tables import STUDIES, cases, run
 
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `make docs`"
@@ -57,17 +57,7 @@ class TestAssumptions:
         told = run("scenes", path).stderr
         assert told.count("warning: beam 'sheet': its longer side is 600 m, more than 100 m; check the unit") == 1
 
-    @pytest.mark.parametrize(
-        ("sides", "said"),
-        [
-            (("60 mm", "12 mm", "13 mm"), "'60x12', thickness: 13 mm exceeds its smaller side, 12 mm"),
-            ((200, 40, 1e-3), "its longer side is 200 m, more than 100 m.* a text such as '200 mm' has its own"),
-            (("8 um", "8 um", "1 um"), "its longer side is 8e-06 m, less than 10"),
-            (("60 mm", "12 mm", "12 mm"), None),
-            ((100, 40, 1e-3), None),
-            (("10 um", "10 um", "1 um"), None),
-        ],
-    )
+    @cases
     def test_the_library_warns(self, sides, said):
         for body in (st.Beam, st.Shape.rectangle):
             with pytest.warns(AssumptionWarning, match=said) if said else nullcontext():
@@ -122,18 +112,7 @@ class TestSchema:
         validator.validate(yaml.safe_load(text))
         st.load_study(study)
 
-    @pytest.mark.parametrize(
-        ("old", "new"),
-        [
-            ("length:", "lenght:"),
-            ("100 mm", "100"),
-            ("poisson_ratio: 0.3", "poisson_ratio: 0.6"),
-            ("mesh_type: [structured, free]", "mesh_type: [structured, structured]"),
-            ("mesh_size: [2 mm, 5 mm]", "mesh_size: []"),
-            ("sensitivity: false", "sensitivity: maybe"),
-            ("  100x20: {", "  .x: {"),
-        ],
-    )
+    @cases
     def test_editors_see_mistakes(self, old, new, validator):
         text = (CONFIG / "quick.yaml").read_text()
         assert old in text

@@ -19,7 +19,8 @@ from springtune.studies.output import dataset, export
 
 from synthetic import SMALL_AXES as AXES
 from synthetic import dataset as every
-from tables import run
+from synthetic import filled
+from tables import beside, cases, run
 
 
 def refused(result, *said, code=1):
@@ -31,29 +32,11 @@ def refused(result, *said, code=1):
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     """Dataset of 8 scenes of one beam: six solved, one failed, one not converged; and of two curves."""
-    root = ROOT.empty(AXES)
-    root["reference_applies"].values[...] = 1
-    place = {"beam": "200x40", "mesh_size": 5e-3}
-    for name, value in (("status", 1), ("deformation_error", 0.01), ("displacement", 1e-3), ("solver", "Cholesky")):
-        root[name].loc[place] = value
-    root["particles"].loc[place] = 100
-    root["reference_displacement"].values[...] = 1e-3
-    root["beam_length"].values[:] = [0.2, 0.1]
-    for mesh_type, status, message in (("free", 3, "last residual 2.5e-01"), ("structured", 5, "springs gone")):
-        cell = place | {"mesh_type": mesh_type, "load": "bending", "definition": "patch"}
-        root["status"].loc[cell], root["message"].loc[cell] = status, message
-        root["deformation_error"].loc[cell] = root["displacement"].loc[cell] = np.nan
-    worst = place | {"mesh_type": "free", "load": "traction", "definition": "lattice"}
-    root["deformation_error"].loc[worst] = -0.2
-    curves = SENSITIVITY.empty(AXES)
-    place = {"beam": "200x40", "mesh_size": 5e-3, "load": "traction"}
-    curves["status"].loc[place], curves["displacement"].loc[place] = 1, 1.0
-    curves["best_stiffness"].loc[place] = 170e6
+    told = beside(__file__)["path"]
+    groups = {group.name: filled(group.empty(AXES), told[group.name]) for group in (ROOT, SENSITIVITY)}
     folder = tmp_path_factory.mktemp("results") / "small"
-    attributes = {"title": "A small one", "study": "small", "springtune_version": st.__version__}
-    attributes |= {"git_commit": "f00d+changes"}
-    attributes |= {"inputs": json.dumps({"config/small.yaml": "5" * 64}), "software": json.dumps({"numpy": "2.0"})}
-    dataset.write(folder / "dataset.nc", {"/": root, "/sensitivity": curves}, attributes)
+    attributes = {"springtune_version": st.__version__, "inputs": json.dumps({"config/small.yaml": "5" * 64})}
+    dataset.write(folder / "dataset.nc", groups, told["attributes"] | attributes)
     return folder
 
 
@@ -85,23 +68,7 @@ def forged(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["info", "{forged}"],
-        ["info", "{named}"],
-        ["diff", "{forged}", "{named}"],
-        ["diff", "{path}", "{forged}"],
-        ["diff", "{forged}", "{other}"],
-        ["export", "{forged}", "--to", "{out}.csv"],
-        ["export", "{forged}", "--to", "{out}.csv", "--group", "nothing"],
-        ["browse", "{out}/{forge}"],
-        ["archive", "{out}/{forge}.yaml"],
-        ["scenes", "{out}/{forge}.yaml"],
-        ["{forge}"],
-    ],
-    ids=" ".join,
-)
+@cases
 def test_nothing_forges_a_line_on_a_terminal(path, forged, tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
     places = {"path": path, "out": tmp_path / "out", "forge": FORGED}

@@ -23,6 +23,7 @@ from campaigns import Campaign
 from pages import blocks as blocks_of
 from pages import check_command, claims, follow, typed
 from synthetic import dataset
+from tables import slow_but
 
 REPOSITORY = Path(__file__).parents[2]
 SITE = sorted(
@@ -191,9 +192,7 @@ SLOW = {"tune-an-engine.md", "take-results-elsewhere.md", "choose-a-mesh.md", "c
 """Of these, which take some seconds each."""
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=pytest.mark.slow) if page.name in SLOW else page for page in FOLLOWED], ids=called
-)
+@pytest.mark.parametrize("page", slow_but([page for page in FOLLOWED if page.name not in SLOW], FOLLOWED), ids=called)
 def test_a_page_can_be_followed(page, repository, monkeypatch):
     from matplotlib import pyplot
 

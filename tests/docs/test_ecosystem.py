@@ -1,13 +1,17 @@
 """What others read of the project besides its pages: environments, hosted CI, the notebook, the software paper."""
 
+import importlib.util
 import json
 import os
 import re
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 from packaging.requirements import Requirement
+
+import springtune as st
 
 REPOSITORY = Path(__file__).parents[2]
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
@@ -64,3 +68,37 @@ def test_numbers_of_the_software_paper_are_those_of_make_paper():
     if made.exists():
         found = json.loads(made.read_text())["numbers"]
         assert stated == {name: found[name]["text"] for name in stated}
+
+
+PROGRAM = Path(__file__).parents[2] / "tools/licences.py"
+
+
+@pytest.fixture(scope="module")
+def licences():
+    spec = importlib.util.spec_from_file_location("licences", PROGRAM)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_table_is_what_the_lock_files_ask_for(licences):
+    licences.main(check=True)
+
+
+def test_the_gpl_comes_with_one_extra_only(licences):
+    parts = licences.parts()
+    assert parts["cholesky"] == {"cvxopt"}
+    under_it = {one: {name for name in names if licences.licence_of(name).startswith(("GPL", "AGPL"))}
+                for one, names in parts.items()}  # fmt: skip
+    assert {name for one, names in under_it.items() if one != "test" for name in names} == {"cvxopt"}
+
+
+REPOSITORY = Path(__file__).parents[2]
+CITATION = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text())
+VERSION, DATE = re.search(r"^## (\S+) \((.*)\)$", (REPOSITORY / "CHANGELOG.md").read_text(), re.MULTILINE).groups()
+"""Of the newest entry of the changelog."""
+
+
+def test_version_of_citation_and_changelog():
+    assert CITATION["version"] == VERSION == st.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+", VERSION)

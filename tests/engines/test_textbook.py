@@ -12,6 +12,7 @@ from springtune.engines import pbd, run
 from springtune.handover.simulation import network_of
 
 from engine_scenes import CASES, TEN, scene
+from tables import cases, slow_but
 
 OURS = ("pbd", "projective", "vbd", "vbd-inertia", "implicit-cg")
 SHEET = ("sheet", "structured", "traction", "foam")
@@ -45,10 +46,7 @@ def relative(found):
 
 
 @pytest.mark.parametrize("case", some(CASES))
-@pytest.mark.parametrize(
-    ("engine", "share", "iterations"),
-    [("projective", 0.1, 30), ("vbd", 10.0, 10), ("vbd-inertia", 1.0, 40), ("implicit-cg", 30.0, 25)],
-)
+@cases
 def test_many_iterations_end_in_our_equilibrium(engine, share, iterations, case):
     """Relative error below 1e-6; the stiffest spring has `share` times the inertia of a step."""
     one = scene(*case, "patch")
@@ -149,10 +147,7 @@ def test_it_rests_where_its_iterations_leave_it(engine, iterations):
     assert size > 1.05 * np.abs(found.network.displacements).max()  # there is an error to be found
 
 
-@pytest.mark.parametrize(
-    ("engine", "h", "rates"),
-    [("xpbd", 1e-4, (2, 4)), ("projective", 2.5e-5, (2, 4)), ("vbd-inertia", 5e-5, (2, 4)), ("pbd", 1e-4, (2, 2))],
-)
+@cases
 def test_rate_in_the_step(engine, h, rates):
     """In short steps an iteration leaves a share of k h^2 / m of the way, n of them its n-th power.
 
@@ -267,13 +262,7 @@ def test_each_iteration_lowers_the_energy_of_a_step(engine):
 
 
 @pytest.mark.parametrize("engine", ["vbd", "vbd-inertia", "implicit-cg"])
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(one, marks=() if one in ("patch-area", "delingette", "neo-hooke") else pytest.mark.slow)
-        for one in of_energies.CASES
-    ],
-)
+@pytest.mark.parametrize("case", slow_but(("patch-area", "delingette", "neo-hooke"), of_energies.CASES))
 def test_energies_besides_springs(engine, case):
     one = of_energies.scene(case)
     if lacking := [each for each in run.net_of(one).energies if each.kind not in st.ENGINES[engine].laws]:
@@ -286,16 +275,7 @@ def test_energies_besides_springs(engine, case):
 
 
 @pytest.mark.parametrize("case", some(TEN))
-@pytest.mark.parametrize(
-    ("engine", "share", "iterations"),
-    [
-        ("xpbd", 35.0, 30),
-        ("projective", 10.0, 60),
-        pytest.param("vbd", 10.0, 20, marks=pytest.mark.slow),
-        ("vbd-inertia", 10.0, 30),
-        ("implicit-cg", 100.0, 25),
-    ],
-)
+@cases
 def test_single_precision(engine, share, iterations, case):
     """Within 1e-3, about the middle of the net. What trembles by rounding has no rest below that."""
     one = scene(*case, "patch")
@@ -419,3 +399,36 @@ def test_cells_turned_inside_out_are_no_rest():
     finally:
         st.ENGINES.discard("folds")
     assert found.status == "inverted" and "turned inside out" in found.message
+
+
+BEAM = st.Beam("80 mm", "40 mm", thickness="2 mm")
+E, NU, H = 1e6, 0.3, 2e-3
+
+
+def net(definition="delingette", nu=NU):
+    rubber = st.Material(E, nu, density=1000.0)
+    one = st.Scene(BEAM, st.make_mesh(BEAM, "right", "20 mm"), rubber, "traction", "0.2 N", definition=definition)
+    return st.SpringNet.from_scene(one, errors=False)
+
+
+def test_triangles_of_vbd_have_lame_constants():
+    shear, first = E * H / (2 * (1 + NU)), E * H * NU / (1 - NU**2)
+    assert st.ENGINES["newton-vbd"].typed(net()) == pytest.approx({"tri_ke": shear, "tri_ka": first})
+
+
+def test_xpbd_refuses_springs_that_it_leaves_out():
+    given = net("patch")
+    given.stiffness[0] *= -1
+    with pytest.raises(st.EngineError, match="negative stiffness, which Newton's XPBD leaves out"):
+        st.ENGINES["newton-xpbd"].function(given, st.Setting(), 0.0)
+
+
+def test_a_mixed_sheet_is_no_material_of_newton():
+    """Triangles of one law in Newton have one material."""
+    given = net()
+    values = {name: one.copy() for name, one in given.energies[0].values.items()}
+    values["tensile"][0] *= 2
+    given.energies[0].values.update(values)
+    with pytest.raises(ValueError, match="those of no material, and Newton has the law of a material alone"):
+        st.ENGINES["newton-vbd"].typed(given)
+    assert np.all(values["tensile"] > 0)

@@ -10,6 +10,7 @@ import springtune as st
 from engine_scenes import TEN
 from engine_scenes import scene as scene_of_engines
 from problems import pulled
+from tables import beside, slow_but
 
 LENGTH, HEIGHT = 0.12, 0.04
 SHEET = st.Shape.rectangle(LENGTH, HEIGHT, loads={"push": pulled(0.0, 1.0, name="push", components="y")})
@@ -21,25 +22,13 @@ MATERIALS = {
     "yeoh": st.Rubber([0.17e6, -5e3, 2e3], **SOFT),
     "woven": st.AnisotropicMaterial.orthotropic("2 MPa", "1 MPa", 0.4, "0.3 MPa", **SOFT),
 }
-CASES = {
-    "area": ("area", "free", "rubber"),
-    "area on rectangles": ("patch-area", "braced", "rubber"),
-    "patch-area": ("patch-area", "free", "rubber"),
-    "delingette": ("delingette", "free", "foam"),
-    "delingette's tensile part": ("delingette-tensile", "structured", "rubber"),
-    "woven, triangles": ("delingette", "structured", "woven"),
-    "woven, rectangles": ("orthotropic", "braced", "woven"),
-    "neo-hooke": ("neo-hooke", "free", "rubber"),
-    "neo-hooke, foam": ("neo-hooke", "structured", "foam"),
-    "neo-hooke, incompressible": ("neo-hooke", "free", "incompressible"),
-    "yeoh": ("yeoh", "structured", "yeoh"),
-}
+CASES = beside(__file__)["CASES"]
 
 
 QUICK = ("patch-area", "delingette", "woven, rectangles", "yeoh")
 """One of each kind of constraints; the others are slow tests."""
 
-ALL = [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
+ALL = slow_but(QUICK, CASES)
 
 
 def scene(case, share=0.05, mesh_size="20 mm"):
@@ -61,9 +50,7 @@ def off(one, substeps, **options):
     return np.abs(found.displacements - exact).max() / np.abs(exact).max()
 
 
-@pytest.mark.parametrize(
-    "case", [pytest.param(case, marks=() if case in QUICK[1:] else pytest.mark.slow) for case in CASES]
-)
+@pytest.mark.parametrize("case", slow_but(QUICK[1:], CASES))
 def test_energies_come_to_our_equilibrium_with_the_second_order_in_the_step(case):
     one = scene(case)
     coarse, fine = (off(one, substeps, tolerance=1e-7) for substeps in (100, 200))

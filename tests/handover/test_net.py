@@ -16,6 +16,8 @@ from springtune.handover.newton import membrane
 from springtune.mechanics.energies import AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
+from tables import cases
+
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 AS_STIFF = st.Rubber([35e9, -5e9, 1e9], density="7850 kg/m^3")
 BEAM = st.Beam("100 mm", "20 mm", thickness="2 mm")
@@ -96,28 +98,7 @@ def unbalanced(net, x):
     return np.linalg.norm(missing) / np.linalg.norm(net.forces)
 
 
-SCENES = {
-    "lattice": ("lattice", "structured"),
-    "uniform": ("uniform", "free"),
-    "paper": ("paper", "structured"),
-    "delingette": ("delingette", "free"),
-    "delingette-tensile": ("delingette-tensile", "structured"),
-    "angular": ("angular", "structured"),
-    "normal-shear": ("normal-shear", "free"),
-    "ielsm": ("ielsm", "free"),
-    "many-body": ("many-body", "free"),
-    "neo-hooke": ("neo-hooke", "free"),
-    "yeoh": ("yeoh", "free"),
-    "area": ("area", "free"),
-    "patch-area": ("patch-area", "structured"),
-    "element-fit on quads": ("element-fit", "braced"),
-    "baudet on quads": ("baudet", "braced"),
-    "baudet-corrected on quads": ("baudet-corrected", "braced"),
-    "flechon on quads": ("flechon", "braced"),
-}
-
-
-@pytest.mark.parametrize(("definition", "mesh_type"), SCENES.values(), ids=SCENES)
+@cases
 def test_a_file_alone_balances_the_scene(definition, mesh_type, tmp_path):
     """By its own formulas, to the rounding of differences of positions: digits are lost by the strain, a thousandth."""
     stiffness = "170e6 N/m" if definition == "paper" else None

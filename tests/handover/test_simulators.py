@@ -13,6 +13,7 @@ from springtune.handover.simulation import STABLE_STEP_SHARE, EquilibriumWarning
 from springtune.mesh import signed_areas
 
 from problems import pulled
+from tables import cases
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 BEAM = st.Beam("60 mm", "20 mm")
@@ -128,16 +129,7 @@ def steps_to_rest(model, one):
     return int(15 / rest / model.opt.timestep)
 
 
-@pytest.mark.parametrize(
-    ("mesh_type", "load", "definition"),
-    [
-        ("structured", "traction", "lattice"),
-        ("free", "compression", "patch"),
-        ("braced", "bending", "baudet"),
-        ("right", "shear", "van-gelder"),
-        ("free", "bending", "delingette"),
-    ],
-)
+@cases
 def test_what_is_opened_moves_to_the_predicted_place(mesh_type, load, definition, tmp_path):
     """The file as it is: nothing is set, nothing is controlled, and it comes to rest where springtune says."""
     one = scene(mesh_type, load, definition)
@@ -149,10 +141,7 @@ def test_what_is_opened_moves_to_the_predicted_place(mesh_type, load, definition
 
 
 @pytest.mark.filterwarnings("ignore:the equilibrium is:springtune.handover.simulation.EquilibriumWarning")
-@pytest.mark.parametrize(
-    ("mesh_type", "definition", "share"),
-    [("structured", "lattice", 0.8), ("free", "lattice", 1.0), ("right", "lattice", 0.8), ("free", "delingette", 1.0)],
-)
+@cases
 def test_a_large_load_does_not_swing_into_a_folded_sheet(mesh_type, definition, share, tmp_path):
     """Traction of a share of Young's modulus: no triangle is turned over on the way, and the rest is the predicted."""
     rubber = st.Material("1 MPa", 0.3, density="1000 kg/m^3", name="rubber")
@@ -186,10 +175,7 @@ def test_the_control_is_added_to_the_load(tmp_path):
     assert model.actuator_ctrlrange.tolist() == [[-20e3, 20e3]]
 
 
-@pytest.mark.parametrize(
-    ("mesh_type", "definition"),
-    [("structured", "lattice"), ("free", "uniform"), ("braced", "axis-exact"), ("right", "delingette")],
-)
+@cases
 def test_the_largest_step_is_sharp(mesh_type, definition, tmp_path):
     """Undamped, frequencies as at rest: a hundredth below it no run is lost, a hundredth above it each."""
     one = scene(mesh_type, "traction", definition, force="1 N")
@@ -371,10 +357,7 @@ def held_and_loaded(found, count):
     return held, forces
 
 
-@pytest.mark.parametrize(
-    ("mesh_type", "load", "definition"),
-    [("structured", "traction", "patch"), ("braced", "shear", "baudet"), ("free", "pressure", "van-gelder")],
-)
+@cases
 def test_sofa_reads_each_spring_with_its_own_stiffness(mesh_type, load, definition, tmp_path):
     one = scene(mesh_type, load, definition)
     result, network = one.solve(), one.network

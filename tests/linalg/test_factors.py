@@ -10,17 +10,9 @@ from hypothesis import strategies as some
 from scipy.sparse import csc_array, csr_array
 
 import springtune as st
-from springtune.linalg import kernels
+from springtune.linalg import factors, kernels
 from springtune.linalg.blocks import Blocks, chunked, dense, first_grid, next_grid, row_pointers
-from springtune.linalg.factors import (
-    Analysis,
-    SingularError,
-    SuperLUFactor,
-    factorize,
-    factorize_pinned,
-    nested_dissection,
-    spread,
-)
+from springtune.linalg.factors import Analysis, SingularError, factorize, factorize_pinned, spread
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, galerkin
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINS_FROM_UNKNOWNS, FollowerPressure, Network, successor
@@ -28,6 +20,8 @@ from springtune.mechanics.statics import StaticProblem
 from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL
 from springtune.springs.lattice import half_weight
+
+from tables import beside, cases
 
 FORCE_OVER_STIFFNESS = 2e-4
 
@@ -321,12 +315,7 @@ def test_multigrid_tells_of_a_particle_that_is_pushed_away(factor):
     assert network.rest_factor.negative_pivots == 1
 
 
-LOOSE = {
-    "island": "one of the 2 bodies that are not joined, at (50, 20) mm, free to move and turn",
-    "island on a pin": "one of the 2 bodies that are not joined, at (50, 20) mm, free to turn about (",
-    "particle": "one of the 2 bodies that are not joined, at (50, 20) mm, free to move and turn",
-    "springs in one line": "a particle is free to move: its springs, if any, are in one line",
-}
+LOOSE = beside(__file__)["LOOSE"]
 
 
 def loose(what):
@@ -393,17 +382,7 @@ def test_no_mechanism_hangs_on_rounding(what, solver):
             network.rest_factor  # noqa: B018
 
 
-@pytest.mark.parametrize(
-    ("solver", "unknowns", "symmetric", "cholesky", "found"),
-    [
-        (None, 2_500_000, True, True, "Cholesky"),
-        (None, 2_500_001, True, True, None),
-        (None, 600_000, True, False, "SuperLU"),
-        (None, 600_000, False, True, "SuperLU"),  # a pressure that follows its side, say
-        (None, 600_001, True, False, None),
-        ("multigrid", 1_000, True, True, None),
-    ],
-)
+@cases
 def test_what_takes_over_from_multigrid(solver, unknowns, symmetric, cholesky, found):
     assert successor(solver, unknowns, symmetric, cholesky) == found
 
@@ -451,10 +430,10 @@ def sheet(mesh_type, size):
 @pytest.mark.parametrize("mesh_type", st.MESH_TYPES)
 def test_the_order_is_of_all_particles_once(mesh_type):
     mesh = sheet(mesh_type, 4e-3).mesh
-    assert sorted(nested_dissection(mesh.points, mesh.edges).tolist()) == list(range(len(mesh.points)))
+    assert sorted(factors.nested_dissection(mesh.points, mesh.edges).tolist()) == list(range(len(mesh.points)))
 
 
 @pytest.mark.parametrize("mesh_type", ["structured", "braced", "isosceles-0.3"])
 def test_a_large_network_fills_in_less_than_in_an_order_of_minimum_degree(mesh_type):
     network = sheet(mesh_type, 1e-3)  # squares with one diagonal have to be larger still
-    assert network.rest_factor.lu.L.nnz < SuperLUFactor(network.tangent()).lu.L.nnz
+    assert network.rest_factor.lu.L.nnz < factors.SuperLUFactor(network.tangent()).lu.L.nnz

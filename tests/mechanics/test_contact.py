@@ -16,6 +16,8 @@ from springtune.problem.geometry import Strip, Trapezoid
 from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
 from springtune.studies.kinds.laying.solve import lay
 
+from tables import cases
+
 RUBBER, STEEL = st.Material(1e6, 0.49, name="rubber"), st.Material(210e9, 0.3, name="steel")
 STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)
 
@@ -35,16 +37,7 @@ def block(mesh_type, size, bottom, modulus=1e6, pressure=0.0, moves_little=True)
     return Body(network, springs.reference, forces=forces, moves_little=moves_little)
 
 
-@pytest.mark.parametrize(
-    ("meshes", "moves_little"),
-    [
-        (("free", "structured"), True),
-        (("braced", "free"), True),
-        (("structured", "right"), True),
-        (("free", "structured"), False),
-        (("structured", "right"), False),
-    ],
-)
+@cases
 def test_contact_patch(meshes, moves_little):
     """Even pressure passes a plane joint of meshes that do not match, exactly: displacements are linear.
 

@@ -15,6 +15,7 @@ from springtune.reference.answers import elastica
 from springtune.scene.mesh_cache import MeshCache
 
 from problems import arch
+from tables import cases
 
 HEIGHT = 0.02
 
@@ -51,19 +52,7 @@ def test_a_slender_column_buckles_at_eulers_load(definition):
     assert found * springs.reference == pytest.approx(-euler, rel=0.02) and not restriction
 
 
-@pytest.mark.parametrize(
-    "mesh_type, definition, rows, bifurcates",
-    [
-        ("structured", "lattice", 5, True),
-        ("structured", "lattice", 4, False),  # an odd number of rows fits
-        ("alternating", "lattice", 4, True),
-        ("alternating", "lattice", 5, False),
-        ("braced", "lattice", 5, True),
-        ("right", "delingette", 4, False),
-        ("right", "lattice", 4, False),  # bends by a sixth of its height at 95 % of the load
-        ("free", "delingette", 4, False),  # bends by 2e-4 of it
-    ],
-)
+@cases
 def test_only_a_path_that_bifurcates_is_said_to(mesh_type, definition, rows, bifurcates):
     """Meshes that are no mirror image bend: the path, followed to a deflection of 3 heights, never loses stability."""
     problem, euler = scene(definition, AXIAL, mesh_type, 20.0, -(np.pi**2) / 48 / 20**2, 0.3, rows)

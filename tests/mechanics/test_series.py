@@ -19,21 +19,13 @@ from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.lattice import COEFFICIENT, uniform
 
 from problems import beam_problem
+from tables import cases
 
 K = 181.87e6
 RATIOS = np.linspace(0.4, 1.6, 61)
 
 
-@pytest.mark.parametrize(
-    ("mesh_type", "length", "height", "size", "force"),
-    [
-        ("structured", 0.2, 0.04, 5e-3, 400e3),
-        ("structured", 0.2, 0.03, 2e-3, 300e3),
-        ("free", 0.2, 0.04, 5e-3, 400e3),
-        ("free", 0.1, 0.02, 2e-3, 20e3),
-        ("structured", 0.1, 0.02, 5e-3, -20e3),
-    ],
-)
+@cases
 def test_curve_agrees_with_separate_solves(mesh_type, length, height, size, force):
     problem, weights = beam_problem(mesh_type, length, height, size)
     targets = force / (RATIOS * K)

@@ -9,6 +9,7 @@ from springtune.mechanics.continuation import follow
 from springtune.mechanics.dynamics import relax
 
 from problems import pulled
+from tables import cases
 
 ARCHES = draw()
 
@@ -88,13 +89,7 @@ def test_a_shape_that_snaps_is_unstable_and_says_where(pushed):
 
 
 @pytest.mark.parametrize("definition", ["patch", "lattice", "area"])
-@pytest.mark.parametrize(
-    "size, status, says",
-    [
-        ("6 mm", st.Status.UNSTABLE, "turns back and becomes unstable at 90."),
-        ("4 mm", st.Status.NOT_CONVERGED, "cells turn inside out beyond 8"),
-    ],
-)
+@cases
 def test_one_event_has_one_status(definition, size, status, says):
     """A quarter of a strip with a hole, stretched to twice its length: cells at the hole collapse."""
     hole = st.Shape(

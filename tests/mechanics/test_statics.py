@@ -14,6 +14,7 @@ from springtune.mechanics.newton import TOLERANCE
 from springtune.mechanics.statics import SMALLEST_STEP, StaticProblem
 
 from problems import arch, beam_problem
+from tables import cases
 
 STRONG = 400e3 / 181.87e6  # F/k of the paper's heaviest load [m]
 
@@ -228,32 +229,11 @@ class Singular:
         raise SingularError("singular")
 
 
-FLAWS = {
-    "none": ({}, st.Status.SOLVED, "", 0),
-    "limit beyond the load": ({"limit_share": 1.2}, st.Status.SOLVED, "", 0),
-    "unstable beyond the load": ({"unstable_share": 1.2}, st.Status.SOLVED, "", 0),
-    "limit at the load": ({"limit_share": 1.0}, st.Status.SOLVED, "", 0),
-    "unstable at the load": ({"unstable_share": 1.0}, st.Status.SOLVED, "", 0),
-    "limit": ({"limit_share": 0.123}, st.Status.UNSTABLE, "turns back and becomes unstable at 12.3 %", np.nan),
-    "no equilibrium": (
-        {"converged": False, "reason": "no luck"},
-        st.Status.NOT_CONVERGED,
-        "no luck; last residual",
-        np.nan,
-    ),
-    "one pivot": ({"factor": SimpleNamespace(negative_pivots=1)}, st.Status.UNSTABLE, "(1 negative pivot)", 1),
-    "two pivots": ({"factor": SimpleNamespace(negative_pivots=2)}, st.Status.UNSTABLE, "(2 negative pivots)", 2),
-    "singular": ({"factor": Singular()}, st.Status.UNSTABLE, "limit point: the tangent is singular", np.nan),
-    "path": (
-        {"unstable_share": 0.25},
-        st.Status.UNSTABLE,
-        "the path to this equilibrium is unstable at 25 % of the load",
-        0,
-    ),
-}
+def pivots(count):
+    return SimpleNamespace(negative_pivots=count)
 
 
-@pytest.mark.parametrize(("changes", "status", "message", "negative"), FLAWS.values(), ids=FLAWS)
+@cases
 def test_an_equilibrium_is_worth_what_its_flaws_leave(changes, status, message, negative):
     problem, s = arch(), -1e-4
     found = replace(problem.nonlinear(s), **changes)

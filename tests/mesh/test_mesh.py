@@ -10,20 +10,12 @@ from hypothesis import strategies as some
 from scipy.spatial import Delaunay
 
 import springtune as st
-from springtune.mesh import (
-    braced,
-    free,
-    isosceles,
-    lattice,
-    quality,
-    read_beam_mesh,
-    read_mesh,
-    signed_areas,
-    structured,
-    write_mesh,
-)
+from springtune import mesh as meshes
+from springtune.mesh import braced, free, lattice, read_beam_mesh, structured, write_mesh
 from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.kinds.bodies.mesh import make
+
+from tables import cases
 
 boxes = {"length": some.floats(0.02, 0.3), "height": some.floats(0.01, 0.05), "size": some.floats(2e-3, 9e-3)}
 
@@ -34,7 +26,7 @@ boxes = {"length": some.floats(0.02, 0.3), "height": some.floats(0.01, 0.05), "s
 def test_any_box_is_covered_once(mesh_type, length, height, size):
     mesh = st.MESH_TYPES[mesh_type](length, height, size)
     for corners in mesh.cells.values():
-        assert (signed_areas(mesh.points, corners) > 0).all()
+        assert (meshes.signed_areas(mesh.points, corners) > 0).all()
     assert mesh.area == pytest.approx(length * height, rel=1e-9)
     assert not mesh.inverted(mesh.points)
     # Euler's formula of a disc, diagonals left out, and each edge at one or two cells.
@@ -62,7 +54,7 @@ def test_rows_are_equilateral_where_they_fit():
     height = 4 * np.sqrt(3) / 2 * 5e-3
     mesh = structured(0.05, height, 5e-3)
     corners = mesh.points[mesh.triangles]
-    whole = np.isclose(signed_areas(mesh.points, mesh.triangles), np.sqrt(3) / 4 * 25e-6)
+    whole = np.isclose(meshes.signed_areas(mesh.points, mesh.triangles), np.sqrt(3) / 4 * 25e-6)
     sides = np.linalg.norm(corners[whole] - np.roll(corners[whole], 1, axis=1), axis=2)
     # 4 rows of 10 triangles on one base and 9 on the other; the two halves at each row's ends are cut.
     assert whole.sum() == 4 * (10 + 9)
@@ -72,7 +64,7 @@ def test_rows_are_equilateral_where_they_fit():
 def test_lattice_is_equilateral_throughout():
     mesh = lattice(7, 5, 2.0)
     assert np.allclose(mesh.edge_lengths, 2.0, rtol=1e-9)
-    assert quality(mesh) == pytest.approx({"minimum_angle": 60.0, "edge_length_spread": 0.0}, abs=1e-7)
+    assert meshes.quality(mesh) == pytest.approx({"minimum_angle": 60.0, "edge_length_spread": 0.0}, abs=1e-7)
 
 
 @pytest.mark.parametrize("size", [5e-3, 2e-3])
@@ -83,14 +75,14 @@ def test_free_has_the_imposed_size_on_its_outline_and_is_delaunay(size):
     other = Delaunay(mesh.points).simplices
     ours, theirs = ({tuple(sorted(corners)) for corners in triangles.tolist()} for triangles in (mesh.triangles, other))
     assert ours == theirs
-    assert quality(mesh)["minimum_angle"] > 30
+    assert meshes.quality(mesh)["minimum_angle"] > 30
 
 
 def test_quality_of_a_right_isosceles_triangle():
     mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
     lengths = np.array([1.0, 1.0, np.sqrt(2)])
     expected = {"minimum_angle": 45.0, "edge_length_spread": lengths.std() / lengths.mean()}
-    assert quality(mesh) == pytest.approx(expected)
+    assert meshes.quality(mesh) == pytest.approx(expected)
 
 
 @pytest.mark.usefixtures("mesh_library")
@@ -100,7 +92,7 @@ def test_file_keeps_every_digit(tmp_path, mesh_type, box):
     mesh = st.MESH_TYPES[mesh_type](*box)
     write_mesh(tmp_path / "mesh.vtu", mesh)
     assert len(read_beam_mesh(tmp_path / "mesh.vtu", *box[:2]).edges) == len(mesh.edges)
-    again = read_mesh(tmp_path / "mesh.vtu")
+    again = meshes.read_mesh(tmp_path / "mesh.vtu")
     assert (again.points == mesh.points).all()
     assert (again.triangles == mesh.triangles).all() and (again.quads == mesh.quads).all()
     kinds = {"braced": ["quad"]}.get(mesh_type, ["triangle"])
@@ -113,20 +105,12 @@ HALVES = [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]
 
 
 @pytest.mark.usefixtures("mesh_library")
-@pytest.mark.parametrize(
-    ("points", "cells", "message"),
-    [
-        (SQUARE, [("line", np.array([[0, 1]]))], "no cell block 'triangle' or 'quad'; write"),
-        (SQUARE, [("tetra", np.array([[0, 1, 2, 3]]))], "has cells 'tetra'; write linear triangles"),
-        (SQUARE + [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0.1]], HALVES, "leave the plane"),
-        (SQUARE * [1, 0, 1], HALVES, "no area"),
-    ],
-)
+@cases
 def test_files_that_are_no_plane_mesh_are_refused(tmp_path, points, cells, message):
     path = tmp_path / "mesh.vtu"
     meshio.Mesh(points, cells).write(path)
     with pytest.raises(st.MeshError, match=f"mesh.vtu: .*{message}"):
-        read_mesh(path)
+        meshes.read_mesh(path)
 
 
 @pytest.mark.usefixtures("mesh_library")
@@ -134,7 +118,7 @@ def test_unreadable_file_is_refused(tmp_path):
     for name, content in (("mesh.txt", "nothing"), ("mesh.vtu", "nothing"), ("mesh.msh", "$MeshFormat")):
         (tmp_path / name).write_text(content)
         with pytest.raises(st.MeshError, match=f"{name}: (cannot be read|unknown format).*(convert|write) it"):
-            read_mesh(tmp_path / name)
+            meshes.read_mesh(tmp_path / name)
 
 
 FORMATS = {"vtu": "vtu", "med": "med", "gmsh22": "msh", "abaqus": "inp"}
@@ -157,7 +141,7 @@ def test_a_beam_may_come_from_any_format(tmp_path, name, mesh_type):
     # Formats in text keep some twelve digits.
     assert np.allclose(found.points, mesh.points, rtol=0, atol=1e-9 * 0.1)
     assert len(found.edges) == len(mesh.edges)
-    assert (signed_areas(found.points, next(iter(found.cells.values()))) > 0).all()
+    assert (meshes.signed_areas(found.points, next(iter(found.cells.values()))) > 0).all()
     for axis, end in ((0, 0.1), (1, 0.02)):
         for value in (0.0, end):
             assert len(found.outline_edges(axis, value)) == len(mesh.outline_edges(axis, value))
@@ -308,15 +292,7 @@ class TestSlits:
         refuse(path, points, {3: cells}, said + " cell of that edge there", length, height)
 
 
-@pytest.mark.parametrize(
-    ("point", "corner", "message"),
-    [
-        ([np.nan, 0.0, 0.0], 1, "points with coordinates that are no numbers: 1, the first one 1; mend"),
-        ([1.0, np.inf, 0.0], 1, "points with coordinates that are no numbers: 1, the first one 1; mend"),
-        ([1.0, 0.0, 0.0], 7, "a cell has point 7, and points are 0 to 3; renumber"),
-        ([1.0, 0.0, 0.0], -3, "a cell has point -3, and points are 0 to 3; renumber"),
-    ],
-)
+@cases
 def test_points_that_are_nowhere_are_refused(tmp_path, point, corner, message):
     points, triangles = SQUARE.copy(), HALVES[0][1].copy()
     points[1], triangles[0, 1] = point, corner
@@ -327,7 +303,7 @@ def test_points_that_are_nowhere_are_refused(tmp_path, point, corner, message):
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_isosceles_rows_have_the_shape_for_their_poisson_ratio(nu):
-    mesh = isosceles(0.2, 0.04, 2e-3, nu)
+    mesh = meshes.isosceles(0.2, 0.04, 2e-3, nu)
     x, y = np.abs(mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]).T
     slanted = (x > 1e-9) & (y > 1e-9)
     # Rows and cells are whole numbers: 22 and 28 rows, 100 cells.
@@ -339,5 +315,5 @@ def test_quads_turn_inside_out_corner_by_corner():
     assert not mesh.inverted(mesh.points)
     pushed = mesh.points.copy()
     pushed[mesh.quads[0, 0]] = [0.008, 0.008]  # past the diagonal: the area stays positive
-    assert signed_areas(pushed, mesh.quads)[0] > 0
+    assert meshes.signed_areas(pushed, mesh.quads)[0] > 0
     assert mesh.inverted(pushed)

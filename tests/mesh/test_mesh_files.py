@@ -51,17 +51,8 @@ def rows(table, first=1):
 
 NODES, CPS4, CPS3 = rows(POINTS), rows(QUADS), rows(TRIANGLES, 5)
 MESH = f"*NODE\n{NODES}*ELEMENT, TYPE=CPS4\n{CPS4}*ELEMENT, TYPE=CPS3\n{CPS3}"
-SIDES = """*NSET, NSET=left
-1, 6, 11
-*NSET, NSET=right
-5, 10, 15
-"""
-PARTS = """*ELSET, ELSET=hard
-1, 2, 5, 6,
-7, 8
-*ELSET, ELSET=soft
-3, 4, 9, 10, 11, 12
-"""
+ROWS = yaml.safe_load(Path(__file__).with_name("mesh_files.yaml").read_text())
+SIDES, PARTS = ROWS["sides"], ROWS["parts"]
 SETS = SIDES + PARTS
 INP = f"*HEADING\nplate\n{MESH}{SETS}"
 
@@ -88,7 +79,6 @@ NOT_READ = "is not supported; mesh the part in the program and write all nodes a
 OTHER_FILES = "parts of it are in other files, whose changes would not be seen"
 LINEAR = "write linear triangles and quadrilaterals only"
 MSH = "write 4.1 or 2.2: Mesh.MshFileVersion = 4.1"
-ROWS = yaml.safe_load(Path(__file__).with_name("mesh_files.yaml").read_text())
 MSH41, MSH22 = ROWS["texts"].values()
 
 

@@ -16,6 +16,8 @@ from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
 from springtune.problem.boundary import check_case
 
+from tables import beside, evaluated
+
 
 def plate(**more):
     holes = [st.Hole.circle((0.05, 0.02), 0.008), st.Hole.circle((0.02, 0.02), 0.005, part="core")]
@@ -241,31 +243,7 @@ def inner_edges(grouped):
     return grouped.mesh.edges[~grouped.mesh.on_outline]
 
 
-UNUSABLE = {
-    "lines inside": (
-        lambda g: lines(g, cut=[*g.sides["left"], *inner_edges(g)[:2]]),
-        "is not on the outline: of its 10 lines 2 are no sides, the first one at",
-    ),
-    "lines across": (lambda g: lines(g, cut=[[0, 30]]), "of its 1 lines 1 are no sides"),
-    "points inside": (
-        lambda g: by_meshio(g, point_sets={"cut": np.arange(len(g.mesh.points))}),
-        "are at the end of no side, the first one at",
-    ),
-    "single points": (
-        lambda g: by_meshio(g, point_sets={"cut": np.array([*np.unique(g.sides["left"]), g.particle("tip")])}),
-        "of its 10 points 1 are at the end of no side, the first one at (100, 21) mm",
-    ),
-    "other values": (
-        lambda g: by_meshio(g, point_data={"cut": np.arange(len(g.mesh.points))}),
-        "has other values than 0 and 1",
-    ),
-    "nothing": (lambda g: by_meshio(g, point_data={"cut": np.zeros(len(g.mesh.points), dtype=int)}), "is 0 all over"),
-    "empty set": (lambda g: by_meshio(g, point_sets={"cut": np.array([], dtype=int)}), "has nothing in the file"),
-    "two materials": (
-        lambda g: by_meshio(g, cell_sets={name: [np.arange(n)] for name, n in {"cut": 9, "other": 5}.items()}),
-        "has cells that part 'other' has, too",
-    ),
-}
+UNUSABLE = evaluated(beside(__file__)["UNUSABLE"], globals())
 
 
 @pytest.mark.usefixtures("mesh_library")
@@ -333,30 +311,7 @@ def hanging():
     return st.Mesh(np.vstack([mesh.points, [1.5, 1.0]]), np.vstack([np.delete(mesh.triangles, cell, axis=0), halves]))
 
 
-FAULTS = {
-    "apart": (two_squares([2, 0]), ""),
-    "joined": (two_squares([1, 0], joined=2), ""),
-    "slit": (two_squares([1, 0]), "do not join their cells"),
-    "slit of one point": (two_squares([1, 0], joined=1), "do not join their cells"),
-    "point": (two_squares([1, 1], joined=1), "cells hang together in a point alone, at (1000, 1000) mm"),
-    "touching points": (two_squares([1, 1]), "two points at (1000, 1000) mm, do not join"),
-    "hanging": (two_squares([1, 0.5]), "hangs on the edge"),
-    "hanging inside": (hanging(), "the point at (1500, 1000) mm hangs on the edge"),
-    "overlap": (two_squares([0.5, 0.3]), "cells overlap"),
-    "inside": (
-        st.Mesh(np.concatenate([UNIT, 0.3 + 0.2 * UNIT]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),
-        "cells lie over",
-    ),
-    "twice": (st.Mesh(UNIT, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]), "edges with two cells on the same side"),
-    "in a hole": (
-        st.Mesh(
-            np.concatenate([UNIT, 0.2 + 0.6 * UNIT, 0.4 + 0.2 * UNIT]),
-            [*([i, (i + 1) % 4, 4 + i] for i in range(4)), *([(i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)),
-             [8, 9, 10], [8, 10, 11]],
-        ),
-        "",
-    ),
-}  # fmt: skip
+FAULTS = evaluated(beside(__file__)["FAULTS"], globals())
 
 
 @pytest.mark.parametrize("name", FAULTS)

@@ -13,6 +13,7 @@ from springtune.prediction.choices import USUAL_LOADS, predicted, references
 from springtune.problem.boundary import held, weights
 
 from problems import pulled
+from tables import slow_but
 
 # Random beams may be thicker than they are high: thickness is a factor.
 pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")
@@ -279,9 +280,7 @@ def worst_by_scenes(body, mesh, material, about, name):
 
 
 class TestAllDefinitionsCount:
-    @pytest.mark.parametrize(
-        "seed", [pytest.param(seed, marks=() if seed in (1, 3, 5) else pytest.mark.slow) for seed in range(8)]
-    )
+    @pytest.mark.parametrize("seed", slow_but((1, 3, 5), range(8)))
     def test_nothing_left_out_is_better(self, seed):
         """Of all definitions that are no search and are given nothing, by scenes."""
         body, mesh, material, about = seeded(seed)

@@ -10,6 +10,7 @@ from springtune.prediction.search import FINER_SIZES, asked_error
 from springtune.scene.mesh_cache import MeshCache
 
 from problems import pulled
+from tables import slow_but
 
 BEAM, STEEL = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
 
@@ -136,9 +137,7 @@ QUESTIONS = {
 class TestBetweenWholeDivisions:
     """Cells are stretched there."""
 
-    @pytest.mark.parametrize(
-        "question", [pytest.param(one, marks=() if one in ("area", "patch") else pytest.mark.slow) for one in QUESTIONS]
-    )
+    @pytest.mark.parametrize("question", slow_but(("area", "patch"), QUESTIONS))
     def test_finer_sizes_keep_the_error(self, question):
         beam, nu, error, loads, mesh_type = QUESTIONS[question]
         material = st.Material("210 GPa", nu)

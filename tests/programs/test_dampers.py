@@ -8,6 +8,8 @@ import pytest
 import springtune as st
 from swings import fit_swing
 
+from tables import cases
+
 BEAM, RUBBER = st.Beam("100 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1100 kg/m^3")
 
 
@@ -79,18 +81,7 @@ SHORT = st.Setting(1e-3, 25)
 """Steps that stay stable with dampers over stiffness that are explicit."""
 
 
-@pytest.mark.parametrize(
-    "name, damper",
-    [
-        ("mujoco-euler", "joint damping"),
-        ("mujoco-implicitfast", "joint damping"),
-        ("mujoco-discrete", "joint damping"),
-        ("mujoco-discrete", "tendon damping"),
-        ("mujoco-discrete", "flex damping"),
-        ("mujoco-rk4", "tendon damping"),
-        ("mujoco-euler", "flex damping"),
-    ],
-)
+@cases
 def test_mujoco(name, damper, tmp_path):
     """Also of what steps of `discrete` damp by themselves, as implicit Euler does."""
     mujoco = pytest.importorskip("mujoco")

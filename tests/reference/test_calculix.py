@@ -14,6 +14,8 @@ from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
 from springtune.reference.small_strain import solve_small_strain
 
+from tables import cases
+
 PULLED = (st.Quantity("end", "displacement", "right", "x"),)
 
 pytestmark = [
@@ -199,19 +201,7 @@ def theirs_of(beam, material, force, size, kind=AXIAL, finite=False):
 BEAM = st.Beam(0.2, 0.04, 1e-3, "200x40")
 
 
-@pytest.mark.parametrize(
-    ("kind", "force", "nu", "size", "close"),
-    [
-        (AXIAL, 400e3, 0.3, 5e-3, 1e-4),
-        (AXIAL, 400e3, 0.3, 2e-3, 1e-4),
-        (AXIAL, 400e3, 0.4999, 2e-3, 3e-4),  # its corners are sharper
-        (BENDING, 1e3, 0.3, 2e-3, 3e-4),
-        (SHEAR, 1e3, 0.3, 2e-3, 3e-4),  # four times as long
-        (BENDING, 1e3, 0.4999, 2e-3, 1e-3),
-        (SHEAR, 1e3, 0.4999, 2e-3, 1e-3),
-        (FACE, -1e6, 0.49, 2.5e-3, 3e-4),
-    ],
-)
+@cases
 def test_small_strain(kind, force, nu, size, close):
     """Even elements are too stiff at the corners of the clamp."""
     material = st.Material(210e9, nu, name="any")
@@ -221,16 +211,7 @@ def test_small_strain(kind, force, nu, size, close):
     assert kind == FACE or theirs < ours
 
 
-@pytest.mark.parametrize(
-    ("kind", "force", "length", "size"),
-    [
-        (AXIAL, 2.0, 0.2, 2.5e-3),
-        (AXIAL, -2.0, 0.2, 2.5e-3),
-        (SHEAR, 7.0, 0.2, 2.5e-3),
-        (BENDING, 0.1333, 0.2, 2.5e-3),  # F L^2 / (E I) = 1
-        (BENDING, 0.0427, 0.5, 5e-3),  # 2
-    ],
-)
+@cases
 def test_finite_strain(kind, force, length, size):
     beam, material = st.Beam(length, 0.04, 1e-3, "beam"), st.Material(1e6, 0.4, name="rubber")
     theirs = theirs_of(beam, material, force, size, kind, finite=True)

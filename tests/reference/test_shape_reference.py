@@ -16,6 +16,7 @@ from springtune.reference.small_strain import ReferenceNotConvergedError, solve_
 from springtune.reference.triangles import side_fit, side_functions, tabulated
 
 from problems import pulled
+from tables import slow_but
 
 STEEL = st.Material(210e9, 0.3, density=7850.0, name="steel")
 PLASTIC = st.Material(1e9, 0.3, name="plastic")
@@ -202,9 +203,7 @@ def estimates_hold(shape, monkeypatch):
         assert found.values[name] == pytest.approx(fine.values[name], rel=both)
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=() if seed == FOLDED[0] else pytest.mark.slow) for seed in FOLDED]
-)
+@pytest.mark.parametrize("seed", slow_but(FOLDED[:1], FOLDED))
 def test_no_triangle_of_a_sector_folds(seed, monkeypatch):
     shape = others.random_sector(seed)
     assert folded(shape) == 0

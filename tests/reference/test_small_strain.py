@@ -6,20 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, MeshQuad, condense, solve
 from skfem.models.elasticity import linear_elasticity
 
 import springtune as st
 from springtune.problem.loads import AXIAL, BENDING, BOTH, FACE, LEFT, LOAD_KINDS, RIGHT, SHEAR, TOP, LoadKind
-from springtune.reference.answers import outline
-from springtune.reference.small_strain import (
-    FIRST_LEVEL,
-    ReferenceNotConvergedError,
-    UnitLevel,
-    solve_small_strain,
-    solve_unit,
-)
+from springtune.reference import answers, small_strain
+from springtune.reference.small_strain import FIRST_LEVEL, UnitLevel, solve_small_strain, solve_unit
+
+from tables import cases
 
 STEEL = st.Material(210e9, 0.3, name="steel")
 RUBBER = st.Material(1e6, 0.5, name="rubber")
@@ -73,19 +70,7 @@ def quadratic(aspect_ratio, nu, count, grading, kind=AXIAL):
 # -- values ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("material", "length", "height", "force", "expected", "stiff"),
-    [
-        # CalculiX's quadratic elements at 1 mm, still some 1e-5 too stiff, in five digits.
-        (STEEL, 200, 40, 400e3, 9.5005, 5e-5),
-        (STEEL, 200, 30, 300e3, 9.5063, 5e-5),
-        (STEEL, 100, 20, 20e3, 0.47501, 5e-5),
-        # At 2 mm and nu = .4999: even elements are up to 4e-4 too stiff at the corners, nu matters less (3e-6).
-        (RUBBER, 200, 40, 0.4, 1.98684, 5e-4),
-        (RUBBER, 200, 30, 0.3, 1.99002, 5e-4),
-        (RUBBER, 100, 20, 0.2, 0.993188, 5e-4),
-    ],
-)
+@cases
 def test_beams_of_the_paper(material, length, height, force, expected, stiff):
     result = solve_small_strain(beam(length, height), material, force)
     assert result.displacement * 1e3 == pytest.approx(expected, rel=stiff)
@@ -175,7 +160,9 @@ def test_slender_bodies_that_bend_are_refused_by_their_ratio_alone(kind, nu):
     """The most slender ones are solved; below 7000 : 1 the bound on rounding is the same on every processor."""
     for ratio in (6300, 7000):
         assert solve_unit(1 / ratio if kind == SHEAR else ratio, nu, kind).error_estimate <= 1e-4
-    with pytest.raises(ReferenceNotConvergedError, match=r"unknown at level 3 .* sides of more than 7000 : 1; such"):
+    with pytest.raises(
+        small_strain.ReferenceNotConvergedError, match=r"unknown at level 3 .* sides of more than 7000 : 1; such"
+    ):
         solve_unit(1 / 7001 if kind == SHEAR else 7001, nu, kind)
 
 
@@ -235,7 +222,7 @@ def test_tighter_tolerance_takes_more_unknowns():
 
 def test_tolerance_out_of_reach_is_an_error_with_level_and_estimate():
     message = r"axial reference, 5 times as long as high, nu = 0.5: .* estimate \d\.\de-\d+ at level 9"
-    with pytest.raises(ReferenceNotConvergedError, match=message) as caught:
+    with pytest.raises(small_strain.ReferenceNotConvergedError, match=message) as caught:
         solve_small_strain(beam(200, 40), RUBBER, 0.4, tolerance=1e-13)
     assert isinstance(caught.value, RuntimeError)
 
@@ -287,7 +274,7 @@ def test_bending_turns_and_shear_is_symmetric():
 
 
 def test_outline_runs_once_around(solution):
-    points, displacements = outline(solution.x, solution.y, solution.displacements)
+    points, displacements = answers.outline(solution.x, solution.y, solution.displacements)
     steps = np.abs(np.roll(points, -1, axis=0) - points)
     assert (steps.min(axis=1) == 0).all()
     assert steps.sum() == pytest.approx(2 * (0.2 + 0.04), rel=1e-9)
@@ -348,3 +335,77 @@ def test_even_quadratic_elements_close_in_at_the_rate_of_the_corner(nu):
     rate = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     # Energy, hence twice the exponent; .1 is scikit-fem's own tolerance for fitted rates.
     assert rate == pytest.approx(2 * corner_exponent(nu), abs=0.1)
+
+
+STEEL = st.Material(210e9, 0.3, name="steel")
+
+
+def bent(load, slenderness=20.0, nu=0.3):
+    """Reference of a cantilever and its force, which is the load times E I / L^2."""
+    beam = st.Beam(slenderness * 0.01, 0.01, 1e-3, "b")
+    material = st.Material(1e9, nu, name="any")
+    force = load * material.young_modulus * beam.thickness * beam.height**3 / 12 / beam.length**2
+    return solve_small_strain(beam, material, force, kind=BENDING)
+
+
+@pytest.mark.parametrize("load", [1e-5, 0.1, 0.5, 1.0, 2.0, 10.0])
+def test_elastica_is_the_solution_of_its_equation(load):
+    s, turn = np.linspace(0, 1, 201), min(load, 2.8)
+    found = solve_bvp(
+        lambda _, turn: np.stack([turn[1], -load * np.cos(turn[0]), np.sin(turn[0])]),
+        lambda start, end: np.array([start[0], end[1], start[2]]),
+        s, np.stack([turn * (s - s**2 / 2), turn * (1 - s), turn * s**2 / 3]), tol=1e-9, max_nodes=50_000,
+    )  # fmt: skip
+    assert found.success
+    assert answers.elastica(load) == pytest.approx(found.y[2, -1], rel=1e-7)
+
+
+def test_effect_of_rotation_begins_with_its_square():
+    assert answers.rotation_effect(0.0) == 0.0
+    assert answers.rotation_effect(0.01) == pytest.approx(-16 / 35 * 1e-4, rel=1e-3)
+    turns = np.linspace(0.001, 3, 100)
+    effects = np.array([answers.rotation_effect(turn) for turn in turns])
+    assert (np.diff(effects) < 0).all() and (effects > -16 / 35 * turns**2 - 1e-9).all()
+
+
+def test_rotation_and_strain_do_not_depend_on_the_unit_of_areas():
+    """Of 20 cells of one size 19 are the share; rounding of their sum took the 20th now and then."""
+    gradients = np.arange(20.0)[:, None, None] * np.array([[1e-3, 0], [0, 0]])
+    for area in np.random.default_rng(1).uniform(1e-6, 1e3, 100):
+        assert answers.most_rotation_and_strain(gradients, np.full(20, area))[1] == pytest.approx(18e-3, rel=1e-9)
+
+
+def test_rotation_and_strain_of_even_fields():
+    x, y = np.linspace(0, 2, 9) ** 2, np.linspace(-1, 1, 6)
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
+    turned = points @ np.array([[0.0, 0.3], [-0.3, 0.0]])
+    assert answers.rotation_and_strain(x, y, turned) == pytest.approx((0.3, 0.0), abs=1e-9)
+    stretched = points @ np.diag([0.02, -0.01])
+    assert answers.rotation_and_strain(x, y, stretched) == pytest.approx((0.0, 0.02), rel=1e-9, abs=1e-9)
+    sheared = points @ np.array([[0.0, 0.0], [0.04, 0.0]])
+    assert answers.rotation_and_strain(x, y, sheared) == pytest.approx((0.02, 0.02), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("load", [0.1, 1.0])
+def test_rotation_of_a_cantilever_is_that_of_its_end(load):
+    found = bent(load)
+    # The end turns by load / 2; 95 % of the length by at most .9975 of that; shear and clamp, some 1 / slenderness^2.
+    assert found.rotation == pytest.approx(load / 2, rel=5e-3)
+    assert found.scaled(-0.5).rotation == pytest.approx(found.rotation / 2)
+
+
+@pytest.mark.parametrize(("load", "applies"), [(0.25, True), (0.35, False), (1.0, False), (2.0, False)])
+def test_a_bent_beam_is_beyond_the_linear_reference_from_one_percent_on(load, applies):
+    found = bent(load)
+    text = answers.beyond_linear(found.rotation, found.strain)
+    assert (text == "") == applies == (abs(3 * answers.elastica(load) / load - 1) <= 0.01)
+    if load == 1.0:
+        assert "turns by 0.5 rad" in text and "9.4 %" in text  # 9.5 at the very end
+
+
+def test_the_paper_s_traction_applies():
+    found = solve_small_strain(st.Beam(0.2, 0.04, 1e-3, "200x40"), STEEL, 400e3)
+    assert found.strain == pytest.approx(400e3 / (210e9 * 40e-6), rel=0.05)  # 4.8 %
+    assert found.rotation < 0.02
+    assert answers.beyond_linear(found.rotation, found.strain) == ""
+    assert "strain is 19 %" in answers.beyond_linear(4 * found.rotation, 4 * found.strain)

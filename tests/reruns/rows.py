@@ -18,18 +18,9 @@ JOBS = {
     "SOLVING": SOLVING,  # of networks, and what comes after them
     "EVERYTHING": f"reference mesh {SOLVING}",
 }
+TABLE = yaml.safe_load(Path(__file__).with_name("rows.yaml").read_text())
 SCENES = {"linear": 24, "nonlinear": 25}
 RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 2, "contrast": 1} | SCENES}
-STAGES = {
-    "curve": "sensitivity",
-    "linear": "solve",
-    "nonlinear": "solve",
-    "fields": "solve",
-    "finite": "reference",
-    "contrast": "stability",
-    "slivers": "stability",
-}
-"""Stages that compute results of a kind."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +52,7 @@ def row(change, jobs="", solved=None):
     counts = {}
     for name, count in (solved or {}).items():
         for kind, one in (RESULTS.get(name) or {name: count}).items():
-            counts[STAGES.get(kind, kind)] = counts.get(STAGES.get(kind, kind), 0) + one
+            counts[TABLE["stages"].get(kind, kind)] = counts.get(TABLE["stages"].get(kind, kind), 0) + one
     return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts)
 
 
@@ -118,7 +109,6 @@ def change_of(told):
     return partial(replace, *told["texts"]) if "texts" in told else partial(replace_twice, *told["then"])
 
 
-TABLE = yaml.safe_load(Path(__file__).with_name("rows.yaml").read_text())
 STUDY = {name: row(**one | {"change": change_of(one["change"])}) for name, one in TABLE["study"].items()}
 STORED = {
     f"{what} deleted": row(partial(delete_first, one["path"]), one.get("jobs", ""), one.get("solved"))

@@ -21,7 +21,7 @@ from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import write
 
 from synthetic import dataset
-from tables import STUDIES
+from tables import STUDIES, beside, cases, evaluated
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
 
@@ -167,17 +167,7 @@ def stated(blocks, count):
 
 STATED = 4_000_000_000
 
-COUNTS = {
-    # by the format of meshio: ending, options, what states a count of points or cells, and what states another one
-    "gmsh": ("msh", {}, stated(1, len(PLATE.points)), stated(1, STATED)),
-    "gmsh, elements": ("msh", {}, stated(1, len(PLATE.triangles)), stated(STATED, STATED)),
-    "gmsh, text": ("msh", {"binary": False}, b"$Nodes\n1 %d", b"$Nodes\n1 4000000000"),
-    "gmsh22": ("msh", {}, b"$Nodes\n%d\n", b"$Nodes\n4000000000\n"),
-    "gmsh22, text": ("msh", {"binary": False}, b"$Nodes\n%d\n", b"$Nodes\n4000000000\n"),
-    "vtk51": ("vtk", {}, b"POINTS %d", b"POINTS 4000000000"),
-    "ply": ("ply", {"binary": False}, b"vertex %d", b"vertex 4000000000"),
-    "medit": ("mesh", {}, b"Vertices\n%d", b"Vertices\n4000000000"),
-}
+COUNTS = evaluated(beside(__file__)["COUNTS"], globals())
 
 
 def plate_file(folder, name, ending, options):
@@ -239,11 +229,7 @@ class TestOfOtherKinds:
         ):
             st.load_study(tmp_path / "study.yaml")
 
-    @pytest.mark.parametrize(
-        "command",
-        [("scenes",), ("run",), ("archive",), ("info",), ("browse",), ("export", "--to", "x.csv")],
-        ids=lambda command: command[0],
-    )  # fmt: skip
+    @cases
     def test_what_a_command_is_given(self, tmp_path, odd, command, monkeypatch):
         monkeypatch.chdir(tmp_path)
         name, *options = command

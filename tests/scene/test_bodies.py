@@ -12,6 +12,7 @@ from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.springs.identification import patch_cases
 
 from problems import pulled
+from tables import cases
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
@@ -63,10 +64,7 @@ def test_axial_and_rotational_springs_of_two_materials_are_linear_triangles_of_b
     np.testing.assert_allclose(mine.displacements, theirs.displacements, rtol=0, atol=1e-9 * size)
 
 
-@pytest.mark.parametrize(
-    ("definition", "materials"),
-    [("area", (STEEL, THIRD)), ("normal-shear", (STEEL, THIRD)), ("neo-hooke", (RUBBER, STEEL))],
-)
+@cases
 def test_springs_of_parts_with_energies_of_their_own_are_files_of_all_cells(grouped, tmp_path, definition, materials):
     scene = st.Scene(PLATE, grouped, dict(zip(("", "core"), materials)), "pull", definition=definition)
     net = scene.springs.write(tmp_path / "net.json")

@@ -12,6 +12,8 @@ from scipy.linalg import eigh
 import springtune as st
 from swings import fit_swing
 
+from tables import cases, slow_but
+
 BEAM, RUBBER = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
 DECREMENT = 0.3
 
@@ -66,10 +68,7 @@ def damped(one, decrement=DECREMENT, step=0.0):
 # -- our integrators ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "definition, load, over",
-    [("patch", "bending", "mass"), ("lattice", "traction", "springs"), ("patch", "shear", "both")],
-)
+@cases
 def test_a_released_beam_decays_as_was_measured(definition, load, over):
     """The mode is alone where dampers are proportional. With x = omega h the midpoint rule has periods that are longer
     by x^2 / 12, and decrements that are smaller by x^2 / 6.
@@ -166,15 +165,10 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
     assert found.decrement == pytest.approx(decrement, rel=2e-3)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "xpbd",
-        "projective",
-        "implicit-cg",
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ("vbd", "vbd-inertia")),
-    ],
-)
+SOON = "xpbd", "projective", "implicit-cg"
+
+
+@pytest.mark.parametrize("name", slow_but(SOON, (*SOON, "vbd", "vbd-inertia")))
 def test_an_implicit_engine_is_given_what_its_steps_lack(name):
     """Iterated to the end it is implicit Euler: it swings with the measured decay about its loaded place."""
     one = scene(size="10 mm", kinematics="nonlinear")

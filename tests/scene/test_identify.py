@@ -19,7 +19,7 @@ from springtune.reference.shapes import solve_shape
 from springtune.scene.identify import Model
 from springtune.scene.measured import blocks, body_of_test
 
-from tables import refused_files
+from tables import cases, refused_files, slow_but
 
 BEAM = st.Beam("100 mm", "20 mm")
 PLY = st.AnisotropicMaterial.orthotropic("14 GPa", "5 GPa", 0.3, "2 GPa", name="ply")
@@ -196,10 +196,7 @@ UNMEASURED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(one, marks=() if one in ("zeros", "patch", "gross") else pytest.mark.slow) for one in UNMEASURED],
-)
+@pytest.mark.parametrize("kind", slow_but(("zeros", "patch", "gross"), UNMEASURED))
 def test_points_that_were_not_measured_are_left_out(tmp_path, kind):
     file = beam_field(tmp_path / "f.csv", spoil=UNMEASURED[kind], seed=1)
     found = st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
@@ -227,10 +224,7 @@ NOT_AS_STATED = {
 }
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(one, marks=() if one in ("v runs down", "windows") else pytest.mark.slow) for one in NOT_AS_STATED],
-)
+@pytest.mark.parametrize("kind", slow_but(("v runs down", "windows"), NOT_AS_STATED))
 def test_what_does_not_fit_is_noted(tmp_path, kind):
     material, load, spoil, note = NOT_AS_STATED[kind]
     file = beam_field(tmp_path / "f.csv", material, load, spoil)
@@ -238,10 +232,7 @@ def test_what_does_not_fit_is_noted(tmp_path, kind):
     assert re.search(note, " ".join(found.notes))
 
 
-@pytest.mark.parametrize(
-    ("load", "sign", "why"),
-    [("traction", -1, "runs against the load"), ("shear", 1, "explains"), ("bending", 1, "explains|runs against")],
-)
+@cases
 def test_a_field_of_another_load_is_refused(tmp_path, load, sign, why):
     file = beam_field(tmp_path / "f.csv", SHEET, load, lambda _, moved, __: sign * moved)
     with pytest.raises(TestDataError, match=f"f.csv.*({why})"):

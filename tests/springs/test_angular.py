@@ -12,6 +12,7 @@ from springtune.springs.normal_shear import slip_form
 
 from patches import errors, patch
 from problems import free_network
+from tables import cases
 
 NAMES = ("normal-shear", "ielsm", "many-body")
 ANY_RATIO = (-0.9, -0.5, 0.0, 0.2, 0.3, 1 / 3, 0.49, 0.5)
@@ -36,14 +37,7 @@ def test_moduli_are_exact(name, mesh_type, nu):
 
 
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.2, 0.3, 0.49])
-@pytest.mark.parametrize(
-    ("name", "mesh_type", "band"),
-    [
-        ("normal-shear", "free", (0.04, 0.03, 0.03)),
-        ("normal-shear", "alternating", (0.02, 0.03, 1e-9)),
-        ("many-body", "free", (0.04, 0.03, 0.02)),
-    ],
-)
+@cases
 def test_moduli_on_other_meshes_are_within_a_band(name, mesh_type, band, nu):
     """Of a/H = 0.1: E, nu and G."""
     young, ratio, shear = errors(name, patch(mesh_type), nu)

@@ -14,6 +14,7 @@ from springtune.mesh import lattice, signed_areas
 from springtune.springs.parts import derive_by_parts
 
 from problems import free_network
+from tables import cases, slow_but
 
 THICKNESS = 2e-3
 PLY = st.AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", name="ply")
@@ -273,21 +274,12 @@ def derived(name, grouped, main, far):
 
 
 ADDITIVE = [name for name, one in st.DEFINITIONS.items() if not one.needs and not one.uniaxial]
-NOT_ADDITIVE = {
-    "density",
-    "oriented",
-    "adjoint",
-    "peridynamic",
-    "force-balance",
-    "best-springs",
-    *(name for name in st.DEFINITIONS if name.startswith("patch")),
-}
+NOT_ADDITIVE = {*"density oriented adjoint peridynamic force-balance best-springs".split()}
+NOT_ADDITIVE |= {name for name in st.DEFINITIONS if name.startswith("patch")}
 """Definitions that count or test the springs of each part alone."""
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "adjoint" else name for name in ADDITIVE]
-)
+@pytest.mark.parametrize("name", slow_but({*ADDITIVE} - {"adjoint"}, ADDITIVE))
 def test_parts_of_equal_materials_are_one_body(name):
     cells = st.DEFINITIONS[name].cells
     mesh = st.MESH_TYPES["structured" if 3 in cells else "braced"](0.04, 0.0104, 2e-3)  # six rows
@@ -312,21 +304,7 @@ STRIPS = {name: st.MESH_TYPES[name](0.04, 0.012, 2e-3) for name in ("right", "br
 STIFF = st.AnisotropicMaterial(7.0, 3.0, 0.0, 2.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "mesh", "axis", "main", "far", "wanted"),
-    [
-        # Side by side strips of one Poisson's ratio strain alike, so E is the mean by height.
-        ("delingette", STRIPS["right"], 1, st.Material(1.0, 0.0), st.Material(7.0, 0.0), (4.0, 0.0)),
-        ("delingette", STRIPS["right"], 1, st.Material(1.0, 0.3), st.Material(7.0, 0.3), (4.0, 0.3)),
-        ("area", STRIPS["braced"], 1, st.Material(1.0, 0.3), st.Material(7.0, 0.3), (4.0, 0.3)),
-        ("orthotropic", STRIPS["braced"], 1, st.Material(1.0, 0.3), st.Material(7.0, 0.3), (4.0, 0.3)),
-        # A row between two materials has the mean of theirs.
-        ("lattice", lattice(20, 8, 1e-3), 1, st.Material(1.0, 0.2), st.Material(7.0, 0.3), (4.0, 1 / 3)),
-        # End to end they give way one after the other.
-        ("delingette", STRIPS["right"], 0, st.Material(1.0, 0.0), STIFF, (2 / (1 / 1 + 1 / 7), 0.0)),
-        ("orthotropic", STRIPS["braced"], 0, st.Material(1.0, 0.0), STIFF, (2 / (1 / 1 + 1 / 7), 0.0)),
-    ],
-)
+@cases
 def test_strips_of_two_materials_have_the_moduli_of_both(name, mesh, axis, main, far, wanted):
     springs = derived(name, halves(mesh, axis), main, far)
     young, ratio = PatchTest(mesh).axial(springs)

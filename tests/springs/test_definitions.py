@@ -17,6 +17,7 @@ from springtune.springs.element_fit import least_squares
 from springtune.springs.lattice import predicted_stiffness
 
 from patches import HEIGHT, SIZE, disturbed, errors, patch
+from tables import beside, evaluated
 
 RATIOS = (0.3, 1 / 3, 0.49)
 EVERY_RATIO = (0.0, 0.2, 0.25, 0.3, 1 / 3, 0.45, 0.49, 0.5)
@@ -24,20 +25,7 @@ EVERY_RATIO = (0.0, 0.2, 0.25, 0.3, 1 / 3, 0.45, 0.49, 0.5)
 
 # -- closed forms ------------------------------------------------------------------------------------------------------
 
-ON_LATTICE = {
-    # name: E over the asked one
-    "uniform": lambda nu: 1.1,  # 1 + sqrt(3)/2 a/H = 1 + 1/rows
-    "oriented": lambda nu: 1.0,
-    "lattice": lambda nu: 1.0,
-    "lloyd": lambda nu: 1.0,
-    "van-gelder": lambda nu: 1.0,
-    "van-gelder-general": lambda nu: (3 - nu) / (3 * (1 - nu**2)),
-    "delingette-tensile": lambda nu: (10 - 6 * nu) / (9 * (1 - nu**2)),
-    "element-fit": lambda nu: 8 / (9 * (1 - nu**2)),
-    "patch": lambda nu: 1.0,
-    "cross-section": lambda nu: 2 / 3,  # bars in three directions, each counted as if alone
-    "force-balance": lambda nu: 1.0,
-}
+ON_LATTICE = evaluated(beside(__file__)["ON_LATTICE"], globals())
 
 
 @pytest.mark.parametrize("nu", EVERY_RATIO)

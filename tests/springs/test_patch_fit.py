@@ -15,6 +15,7 @@ from springtune.mechanics.network import Network
 from springtune.mesh import lattice, signed_areas
 from springtune.springs.patch_fit import TESTS, outline_tests
 
+from patches import errors, patch
 from problems import free_network
 
 UNIT = st.Material(1.0, 1 / 3, name="unit")
@@ -199,3 +200,16 @@ def test_rows_fix_what_shear_is_to_stiffness_across_them(row_height, row, diagon
     springs = st.DEFINITIONS["lattice"].springs(mesh, UNIT, 1.0)
     stiffness = PatchTest(mesh).stiffness(replace(springs, relative=springs.relative * np.where(level, row, diagonal)))
     assert stiffness[1, 1] / stiffness[2, 2] == pytest.approx(4 * row_height**2, rel=1e-9)
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "right", "alternating", "braced", "isosceles-0.5"])
+@pytest.mark.parametrize("name", ["patch", "patch-area"])
+def test_patch_makes_young_modulus_exact_on_any_mesh(name, mesh_type):
+    assert errors(name, patch(mesh_type), 0.45)[0] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["uniform", "lattice", "van-gelder", "element-fit", "delingette-tensile", "patch"])
+def test_mesh_fixes_poisson_ratio_of_rows(name):
+    """Only the row springs carry a load along the rows: nu = (a / 2h)^2."""
+    assert errors(name, patch("isosceles-0.5"), 0.2)[1] == pytest.approx(0.5, rel=1e-9)
+    assert errors(name, patch("right"), 0.2)[1] == pytest.approx(0.0, abs=1e-9)

@@ -21,7 +21,7 @@ from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.springs.rubber import FLAT, SpringLaw
 
 from problems import pulled
-from tables import refused_files
+from tables import cases, refused_files
 
 TRELOAR = Path(__file__).parents[2] / "config/treloar"
 
@@ -66,14 +66,7 @@ def test_treloars_rubber():
 
 @pytest.mark.parametrize("stretch", [0.4, 0.95, 1.05, 1.5, 3.0, 6.0])
 @pytest.mark.parametrize("test", RUBBER_TESTS)
-@pytest.mark.parametrize(
-    ("definition", "material", "rubber"),
-    [
-        ("yeoh", st.Rubber((2e5, -5e2, 40.0)), st.Rubber((2e5, -5e2, 40.0))),
-        ("neo-hooke", st.Material("0.6 MPa", 0.5), st.Rubber((1e5,))),
-    ],
-    ids=["yeoh", "neo-hooke"],
-)
+@cases
 def test_a_network_answers_with_the_stress_of_its_law(definition, material, rubber, test, stretch):
     """A square of two triangles, pulled as in each of the tests, by Newton's method; to 1e-9 of its stretch."""
     mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))

@@ -19,25 +19,10 @@ from functools import partial
 
 import numpy as np
 
+import mechanics
 import springtune as st
 from arches import ENDS, Arch
-from mechanics import (
-    LONG,
-    Body,
-    Part,
-    angle_forces,
-    angles_of,
-    area_forces,
-    area_of,
-    element_forces,
-    factor_forces,
-    follower_forces,
-    rubber_forces,
-    sides_of,
-    slip_forces,
-    spring_forces,
-    squares_forces,
-)
+from mechanics import LONG, Body, Part, area_of, sides_of, spring_forces
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import FollowerPressure
 from springtune.problem.geometry import AssumptionWarning
@@ -228,7 +213,7 @@ def body_of(scene, mesh, springs):
     follower = None
     if st.LOADS[scene.load].follower and scene.kinematics == "nonlinear":
         ends = np.stack([order[:-1], order[1:]], axis=1)
-        follower = Part(ends, follower_forces, np.full(len(ends), 1 / length))
+        follower = Part(ends, mechanics.follower_forces, np.full(len(ends), 1 / length))
 
     return Body(x, held, pattern, parts_of(scene, mesh, springs), follower)
 
@@ -255,39 +240,39 @@ def parts_of(scene, mesh, springs):
             modulus = (3 * nu - 1) / (4 * (1 - nu) if scene.definition == "flechon" else 2 * (1 - nu**2))
             if scene.definition == "patch-area":  # its one scalar
                 modulus *= springs.reference / (2 / math.sqrt(3) / (1 + nu) * young * t)
-            parts.append(Part(corners, area_forces, np.full(len(corners), modulus * young * t), area))
+            parts.append(Part(corners, mechanics.area_forces, np.full(len(corners), modulus * young * t), area))
         elif scene.definition == "angular":
             squares = 4 / math.sqrt(3) * area
             modulus = squares * young * t * (1 - 3 * nu) / (6 * math.sqrt(3) * (1 - nu**2))
-            parts.append(Part(corners, angle_forces, modulus[:, None], angles_of(rest)[0]))
+            parts.append(Part(corners, mechanics.angle_forces, modulus[:, None], mechanics.angles_of(rest)[0]))
         elif scene.definition == "ielsm":
-            angles = angles_of(rest)[0]
+            angles = mechanics.angles_of(rest)[0]
             bulk, shear = young * t / (2 * (1 - nu)), young * t / (2 * (1 + nu))
             before, after = np.roll(np.cos(angles), 1, axis=1), np.roll(np.cos(angles), -1, axis=1)
             scale = (area / np.sin(angles).prod(axis=1))[:, None] / np.sin(angles)
             modulus = scale * ((shear - bulk) * np.cos(angles) + bulk * before * after)
-            parts.append(Part(corners, angle_forces, modulus, angles))
+            parts.append(Part(corners, mechanics.angle_forces, modulus, angles))
         elif scene.definition == "many-body":
             modulus = young * t * (3 * nu - 1) / (2 * (1 - nu**2)) * area
-            parts.append(Part(corners, factor_forces, modulus, (sides_of(rest) ** 2).sum(axis=(1, 2))))
+            parts.append(Part(corners, mechanics.factor_forces, modulus, (sides_of(rest) ** 2).sum(axis=(1, 2))))
         elif scene.definition == "normal-shear":
             sides = sides_of(rest)
             modulus = young * t * (1 - 3 * nu) / (1 - nu**2) * 2 * area / (sides**2).sum(axis=(1, 2))
-            parts.append(Part(corners, slip_forces, inverse_of(rest, area), sides, modulus))
+            parts.append(Part(corners, mechanics.slip_forces, inverse_of(rest, area), sides, modulus))
         elif scene.definition in ("delingette", "neo-hooke"):
             inverse = inverse_of(rest, area)
             shear = young * t / (2 * (1 + nu))
             if scene.definition == "delingette":
-                law, moduli = element_forces, (young * t * nu / (1 - nu**2), shear)
+                law, moduli = mechanics.element_forces, (young * t * nu / (1 - nu**2), shear)
             else:
-                law, moduli = rubber_forces, (shear, 0.0 if nu >= 0.5 else young * t / (3 * (1 - 2 * nu)))
+                law, moduli = mechanics.rubber_forces, (shear, 0.0 if nu >= 0.5 else young * t / (3 * (1 - 2 * nu)))
             parts.append(Part(corners, law, inverse, area, *(np.full(len(corners), one) for one in moduli)))
         elif scene.definition == "delingette-tensile":
             first, second = young * t * nu / (1 - nu**2), young * t / (1 + nu)
-            angles, a, b = angles_of(rest)
+            angles, a, b = mechanics.angles_of(rest)
             stiffness = (2 * (first + second) / np.tan(angles) ** 2 + second) / (16 * area[:, None])
             opposite = b - a
-            parts.append(Part(corners, squares_forces, stiffness, (opposite**2).sum(axis=2)))
+            parts.append(Part(corners, mechanics.squares_forces, stiffness, (opposite**2).sum(axis=2)))
         elif springs.energies:
             raise ValueError(f"the energies of '{scene.definition}' are not in the audit; write them in mechanics.py")
     return parts
@@ -367,7 +352,7 @@ def audit_snap(scene, path=True):
         return []
     follower = pressure = judge = None
     if arch.load == "follower-pressure":
-        follower = Part(edges, follower_forces, np.ones(len(edges)))
+        follower = Part(edges, mechanics.follower_forces, np.ones(len(edges)))
         pressure = FollowerPressure(mesh, edges, 1.0)
     body = Body(mesh.points, held, pattern, parts_of(arch, mesh, springs), follower, 0.0 if given is None else given)
     masses = masses_of(mesh)

@@ -1,4 +1,4 @@
-# A workflow of others, which uses this one; test_modules.py fills in what is in braces.
+# A workflow of others, which uses this one; test_elsewhere.py fills in what is in braces.
 rule all:
     input: "told.txt", "results/mine/index.html"
 

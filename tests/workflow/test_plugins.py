@@ -12,6 +12,8 @@ import pytest
 import xarray as xr
 import yaml
 
+from tables import cases
+
 REPOSITORY = Path(__file__).parents[2]
 PLUGIN = REPOSITORY / "examples/plugin"
 
@@ -87,18 +89,7 @@ print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.rerun_reas
 SPRINGS, METADATA = "springtune_example/springs.py", "springtune_example-1.0.dist-info/METADATA"
 
 
-@pytest.mark.parametrize(
-    ("file", "before", "after", "again"),
-    [
-        (SPRINGS, "# nothing", "", ""),
-        (SPRINGS, "0.8 *", "0.9 *", "mesh solve collect"),
-        pytest.param(
-            SPRINGS, "(BOTTOM, BOTH),", "(BOTTOM, (1,)),", "reference mesh solve collect", marks=pytest.mark.slow
-        ),
-        pytest.param(METADATA, "Version: 1.0", "Version: 1.1", "mesh solve collect", marks=pytest.mark.slow),
-    ],
-    ids=["nothing", "a definition", "a load's supports", "the version"],
-)
+@cases
 def test_changes_of_a_package_compute_again_what_uses_it(run, site, tmp_path, file, before, after, again):
     changed = shutil.copytree(site, tmp_path / "site", ignore=shutil.ignore_patterns("__pycache__"))
     text = (changed / file).read_text()

@@ -11,20 +11,10 @@ from springtune.problem.parameters import MOST_SCENES_VARIABLE, SWEPT
 from springtune.studies.config.fields import spaced
 
 from campaigns import Campaign
-from tables import STUDIES, refused_files
+from tables import STUDIES, beside, refused_files
 
 HEAD = STUDIES["grids_head"]
-GRID = {
-    "beam": "long",
-    "mesh_type": "structured",
-    "mesh_size": "10 mm",
-    "material": "steel",
-    "load": "traction",
-    "force": "1 kN",
-    "definition": "lattice",
-    "kinematics": "linear",
-    "sensitivity": "false",
-}
+GRID = beside(__file__)["GRID"]
 
 
 def grid_text(grid):

@@ -19,7 +19,7 @@ from springtune.cli import main
 from springtune.studies.config.kind import kinds, outputs
 from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec
 
-from tables import STUDIES, refused_files, study_text
+from tables import STUDIES, beside, refused_files, study_text
 
 CONFIG = Path(__file__).parents[3] / "config"
 LATTICE = math.sqrt(3) / 2
@@ -83,15 +83,7 @@ class TestCalibrationCurves:
         assert [mesh_name(curve.mesh) for curve in curves] == ["long_structured_2mm", "long_structured_5mm"]
 
 
-AXES = {
-    "beam": ["long", "short"],
-    "mesh_type": ["structured", "free"],
-    "mesh_size": ["2 mm", "0.5 mm", "5 mm"],
-    "material": ["steel", "rubber"],
-    "load": ["traction", "compression"],
-    "definition": ["calibrated", "lattice"],
-    "kinematics": ["linear", "nonlinear"],
-}
+AXES = beside(__file__)["AXES"]
 
 
 @some.composite

@@ -13,18 +13,15 @@ from springtune.studies.kinds.benchmark.kind import KIND
 from springtune.studies.kinds.benchmark.solve import LoadedBeam
 from springtune.studies.kinds.collect import group_of
 
+from tables import beside, cases
+
 BEAM = st.Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {
     "traction": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), "traction", 20e3),
     "bending": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), "bending", 200.0),
     "block": LoadedBeam(BEAM, st.Material(1e6, 0.49, 1000.0, "rubber"), "pressure", -10.0),
 }
-CLOSE = {
-    # largest error at 2 mm, ten rows: linear triangles; quadratic; constant boundary elements; no physics
-    "traction": (5e-4, 1e-4, 1e-3, 5e-3),
-    "bending": (2e-2, 5e-4, 0.6, 3e-2),
-    "block": (2e-3, 3e-4, 1e-2, 0.3),
-}
+CLOSE = beside(__file__)["CLOSE"]
 
 
 def answer(scene, approach, size=2e-3):
@@ -102,14 +99,7 @@ def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
     assert (parts > 0).all() and (found.factorizing_seconds[1] > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("error", "status", "message"),
-    [
-        (st.DefinitionError("no stiffness"), st.Status.FAILED, "no stiffness"),
-        (MemoryError(), st.Status.FAILED, "not enough memory"),
-        (ArithmeticError("no end"), st.Status.NOT_CONVERGED, "no end"),
-    ],
-)
+@cases
 def test_a_case_that_fails_is_a_hole_that_says_so(error, status, message, monkeypatch):
     def approach(scene, size, clock):
         if size < 4e-3:

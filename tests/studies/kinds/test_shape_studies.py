@@ -20,7 +20,7 @@ from springtune.studies.output.dataset import STATUS
 from springtune.studies.runs.rerun import output_files
 
 from campaigns import do_stages, load_text
-from tables import STUDIES
+from tables import STUDIES, cases
 
 COOK = STUDIES["shapes"]
 
@@ -176,16 +176,7 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     assert shape_mesh_keys(load(yaml.safe_dump(moved), "moved.yaml")) != before
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("right", "rihgt", ["shapes.plate.loads.pull", "no group is named 'rihgt'; did you mean 'right'?"]),
-        ("left: fixed", "left: {x: 0}", ["supports leave the body free to"]),
-        ("plate.vtu", "no.vtu", ["No such file or directory; give its path relative to the study's folder"]),
-        ("definition:", "mesh_size: 5 mm\n    definition:", ["'plate' is a mesh file, which has its own; remove it"]),
-        ("    file:", "    parts: {core: steel}\n    file:", ["unknown part 'core'; the file has none"]),
-    ],
-)
+@cases
 def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate, old, new, said):
     message = refusal(yaml.safe_dump(PLATE).replace(old, new))
     assert all(part in message for part in said), message
@@ -196,14 +187,7 @@ STRETCH = 1e3 / (0.04 * 1e-3) * (0.05 / 210e9 + 0.05 / 2e9)
 """Of the plate, its left half of steel, its right half of a polymer [m]."""
 
 
-@pytest.mark.parametrize(
-    ("whole", "parts", "material"),
-    [
-        (True, {"hard": "steel", "soft": "polymer"}, "other"),
-        pytest.param(True, {"soft": "polymer"}, "steel", marks=pytest.mark.slow),
-        (False, {"hard": "steel"}, "polymer"),
-    ],
-)
+@cases
 def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypatch, whole, parts, material):
     mesh = st.make_mesh(st.Beam("100 mm", "40 mm"), "right", "10 mm")
     left = mesh.points[mesh.triangles, 0].mean(axis=1) < 0.05

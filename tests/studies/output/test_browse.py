@@ -21,6 +21,7 @@ from springtune.studies.kinds.samples.designs import PARAMETERS
 from springtune.studies.output.browse.page import packed, page, views
 
 from synthetic import dataset
+from tables import beside
 
 TITLE = "<script>alert('&')</script>"
 
@@ -108,11 +109,7 @@ class TestPage:
 class TestOverview:
     """What the page says first, without a script."""
 
-    AXES = {
-        "beam": ("100x20",), "mesh_type": ("free",), "mesh_size": (1e-3, 5e-3), "material": ("steel",),
-        "load": ("traction",), "definition": ("paper", "patch", "neo-hooke"), "kinematics": ("linear",),
-        "stiffness_ratio": (1.0,),
-    }  # fmt: skip
+    AXES = beside(__file__)["overview"]
 
     def said(self, tmp_path, rows):
         """Text of the overview of scenes on one beam."""

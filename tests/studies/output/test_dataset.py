@@ -17,18 +17,9 @@ from springtune.studies.output.dataset import CHUNK_BYTES, Group
 from springtune.studies.runs import provenance
 from springtune.studies.runs.source import clone, workflow_folder
 
-from tables import STUDIES
+from tables import STUDIES, beside, slow_but
 
-AXES = {
-    "beam": ("a", "b"),
-    "mesh_type": ("structured",),
-    "mesh_size": (1e-3, 2e-3),
-    "material": ("steel",),
-    "load": ("traction",),
-    "definition": ("paper",),
-    "kinematics": ("linear",),
-    "stiffness_ratio": (0.5, 1.0),
-}
+AXES = beside(__file__)["dataset AXES"]
 
 VERSION = {"springtune_version": "0"}
 
@@ -89,9 +80,7 @@ def test_arrays_are_read_when_needed_and_by_chunks(tmp_path):
 class TestConventions:
     """CF 1.11, as the checker of IOOS reads it; it looks at root groups alone, so each group is made one."""
 
-    @pytest.mark.parametrize(
-        "name", [name if name == "bodies/" else pytest.param(name, marks=pytest.mark.slow) for name in GROUPS]
-    )
+    @pytest.mark.parametrize("name", slow_but({"bodies/"}, GROUPS))
     def test_every_group_of_every_kind_passes(self, tmp_path, name):
         group = GROUPS[name]
         dimensions = {dimension for row in group.variables.values() for dimension in row[0]}

@@ -20,18 +20,9 @@ from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import rerun
 
-from tables import STUDIES
+from tables import STUDIES, beside
 
-AXES = {
-    "beam": ("100x20", "80x10"),
-    "mesh_type": ("free",),
-    "mesh_size": (1e-3, 5e-3),
-    "material": ("steel",),
-    "load": ("traction",),
-    "definition": ("lattice", "patch"),
-    "kinematics": ("linear",),
-    "stiffness_ratio": (1.0,),
-}
+AXES = beside(__file__)["AXES"]
 
 
 def cell(**chosen):
@@ -41,16 +32,8 @@ def cell(**chosen):
 @pytest.fixture
 def rows():
     """Four scenes on one beam and one on the other: solved by 1 % and -20 %, one each of what may go wrong."""
-    known = {"material": "steel", "load": "traction", "kinematics": "linear"}
-    lost = {"status": st.Status.UNSTABLE, "deformation_error": 5.0, "message": "it would leave"}
-    return [
-        *({"beam": one, "reference_displacement": 1e-3, "reference_applies": 1} | known for one in AXES["beam"]),
-        cell() | {"status": st.Status.SOLVED, "deformation_error": 0.01},
-        cell(definition="patch") | {"status": st.Status.SOLVED, "deformation_error": -0.2},
-        cell(definition="patch", mesh_size=5e-3) | lost,
-        cell(mesh_size=5e-3) | {"status": st.Status.NOT_CONVERGED, "message": "residual 1e-3"},
-        cell(beam="80x10") | {"status": st.Status.FAILED, "message": "refuses the mesh"},
-    ]
+    references, scenes = beside(__file__)["rows"][:2], beside(__file__)["rows"][2:]
+    return [*map(dict, references), *(cell() | scene for scene in scenes)]
 
 
 @pytest.fixture

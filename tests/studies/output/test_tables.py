@@ -18,40 +18,22 @@ from springtune.studies.kinds.stability.kind import KIND as STABILITY
 from springtune.studies.output import page as tables_page
 from springtune.studies.output.text import decimals, number
 
+from synthetic import filled
+from tables import beside, cases
+
 # -- which definition --------------------------------------------------------------------------------------------------
 
-SIZES = (1e-3, 2e-3, 5e-3)
-BEAMS = {"100x20": 0.02, "200x40": 0.04}
+
+def made(name, kind=None):
+    """Group of a kind, or else of scenes, whose rows are in `cases.yaml`; of the table of this name there."""
+    told = beside(__file__)[name]
+    group = group_of(kind) if kind else ROOT
+    used = {name: one for name, one in group.variables.items() if {*one[0]} <= {*told["axes"]}}
+    return filled(group.empty(told["axes"], used), told[group.name])
 
 
 def compared():
-    """Dataset of `area` on the free mesh, whose error is a tenth of a/H, on two beams, and moduli that tell sizes."""
-    axes = {
-        "beam": tuple(BEAMS), "mesh_type": ("structured", "free"), "mesh_size": SIZES, "material": ("steel", "nu-0.5"),
-        "load": ("traction", "bending", "shear"), "definition": ("area", "adjoint"), "kinematics": ("linear",),
-        "poisson_ratio": (0.3, 0.5),
-    }  # fmt: skip
-    root = ROOT.empty(axes)
-    root["material_poisson_ratio"].values[:] = 0.3, 0.5
-    root["beam_height"].values[:] = tuple(BEAMS.values())
-    root["beam_length"].values[:] = 0.1, 0.2
-    for beam, height in BEAMS.items():
-        for size in SIZES:
-            place = {"beam": beam, "mesh_type": "free", "mesh_size": size, "definition": "area"}
-            root["deformation_error"].loc[place] = 0.1 * size / height * (-1 if beam == "200x40" else 1)
-            root["status"].loc[place] = 1
-    place = {"beam": "100x20", "mesh_type": "free", "mesh_size": 5e-3, "definition": "adjoint"}
-    root["deformation_error"].loc[place], root["status"].loc[place] = 0.5, 1
-    # More scenes of the first beam, so that its tables are printed.
-    root["status"].loc[{"beam": "100x20", "mesh_type": "structured", "definition": "area"}] = 1
-    moduli = group_of(MODULI).empty(axes)
-    for size in SIZES:
-        place = {"definition": "area", "mesh_size": size}
-        moduli["young_modulus_error"].loc[place] = size / 1e-3 / 100  # 1 % at 1 mm
-        moduli["effective_poisson_ratio"].loc[place] = size / 1e-2
-        moduli["status"].loc[place] = 1
-    place = {"definition": "adjoint", "mesh_size": 5e-3}
-    moduli["young_modulus_error"].loc[place], moduli["status"].loc[place] = 0.05, 1
+    root, moduli = made("compared"), made("compared", MODULI)
     moduli.attrs = {"patch_length": 0.1, "patch_height": 0.02}
     return xr.DataTree.from_dict({"/": root, "/moduli": moduli})
 
@@ -96,16 +78,7 @@ def test_a_range_counts_the_meshes_that_were_asked_for():
 
 
 def timed():
-    """Group of a benchmark with made-up errors, the finest mesh size first."""
-    axes = {"scene": ("traction",), "approach": ("steady", "slow"), "mesh_size": (1e-3, 2e-3, 5e-3, 1e-2),
-            "thread_count": (1, 2), "precision": ("float64", "float32")}  # fmt: skip
-    data = group_of(BENCHMARK).empty(axes)
-    data["error"].values[0] = [(0.0002, 0.0008, 0.005, 0.02), (np.nan, np.nan, 0.001, 0.002)]
-    data["seconds"].values[:] = np.where(np.isfinite(data.error), (0.08, 0.02, 0.004, 0.001), np.nan)
-    data.status.values[:] = [[[1, 1, 1, 1], [5, 5, 1, 1]]]
-    data.message.values[0, 1, :2] = "not run", "no memory"
-    data["spring_updates"].values[:] = 2e8
-    return xr.DataTree.from_dict({"/benchmark": data})
+    return xr.DataTree.from_dict({"/benchmark": made("timed", BENCHMARK)})
 
 
 def test_the_tables_of_the_benchmark_have_numbers_and_holes():
@@ -118,15 +91,7 @@ def test_the_tables_of_the_benchmark_have_numbers_and_holes():
     assert steps[0]["million_springs_a_second"] == pytest.approx(200)
 
 
-@pytest.mark.parametrize(
-    ("errors", "wanted"),
-    [
-        ((0.0002, -0.0008, 0.005), (np.nan, 0.0008, 0.005)),  # nothing finer than the first was run
-        ((0.15, 0.12, 0.0002), (np.nan, 0.15, 0.15)),  # crosses zero on its way
-        ((0.0001, np.nan, 0.0003), (np.nan, np.nan, np.nan)),  # a finer one failed
-        ((np.nan, 0.01, 0.02), (np.nan, np.nan, 0.02)),
-    ],
-)
+@cases
 def test_an_error_counts_only_with_all_finer_ones(errors, wanted):
     assert assured(np.array([errors]))[0] == pytest.approx(wanted, nan_ok=True)
 
@@ -135,21 +100,7 @@ def test_an_error_counts_only_with_all_finer_ones(errors, wanted):
 
 
 def stressed():
-    """Group of strains of which one flutters."""
-    axes = {
-        "definition": ("lattice", "area"), "experiment": ("strains",),
-        "strain_load": ("axial", "follower-pressure"), "strain": (-0.1, 0.1),
-    }  # fmt: skip
-    used = [name for name, one in STABILITY.variables.items() if set(one[0]) <= set(axes)]
-    strains = group_of(STABILITY).empty(axes, used)
-    strains["strain_status"].values[:], strains["strain_load_share"].values[:] = 1, 1.0
-    strains["negative_pivots"].values[:] = 0.0
-    place = {"definition": "area", "strain_load": "follower-pressure", "strain": 0.1}
-    strains["strain_status"].loc[place] = 4
-    strains["strain_message"].loc[place] = "flutter: two modes have merged"
-    place = {"definition": "area", "strain_load": "axial", "strain": -0.1}
-    strains["strain_status"].loc[place], strains["negative_pivots"].loc[place] = 4, 2.0
-    return xr.DataTree.from_dict({"/stability": strains})
+    return xr.DataTree.from_dict({"/stability": made("stressed", STABILITY)})
 
 
 def test_the_table_of_strains_tells_flutter_from_buckling():
@@ -174,30 +125,9 @@ def test_the_table_of_buckling_loads_says_where_nothing_bifurcates():
 
 
 def scenes(printed=False):
-    """Root of a bar, 2 mm thick, whose `area` is linear alone and whose `lattice` is unstable in compression."""
-    axes = {
-        "beam": ("alu-bar",), "mesh_type": ("free",), "mesh_size": (4e-3,), "material": ("alu",),
-        "load": ("traction", "compression"), "definition": ("lattice", "area"), "kinematics": ("nonlinear", "linear"),
-    }  # fmt: skip
-    root = ROOT.empty(axes)
-    root["beam_length"].values[:], root["beam_height"].values[:] = 0.12, 0.025
-    root["beam_thickness"] = ("beam", [2e-3])
-    root["force"].values[:], root["reference_displacement"].values[:] = 1e4, 3.42e-6
-    root["reference_applies"].values[:] = 1
-    root["status"].loc[{"definition": "lattice"}] = 1
-    root["displacement"].loc[{"definition": "lattice"}] = 3.5e-6
-    root["deformation_error"].loc[{"definition": "lattice"}] = 0.0234
-    place = {"definition": "lattice", "load": "compression", "kinematics": "nonlinear"}
-    root["status"].loc[place] = 4
-    place = {"definition": "area", "kinematics": "linear", "load": "traction"}
-    root["status"].loc[place], root["displacement"].loc[place] = 1, 3.4e-6
-    root["deformation_error"].loc[place] = -0.006
-    place = {"definition": "area", "kinematics": "linear", "load": "compression"}
-    root["status"].loc[place], root["message"].loc[place] = 3, "no equilibrium"
+    root = made("scenes")
     if printed:
-        place = {"load": "traction"}
-        root["paper_displacement"].loc[place], root["paper_reference_displacement"].loc[place] = 3.6e-3, 3.4e-3
-        root["paper_deformation_error"].loc[place], root["paper_table"].loc[place] = 0.0588, 7
+        filled(root, beside(__file__)["scenes"]["printed"])
     return xr.DataTree(root.assign_attrs(title="A bar", springtune_version="1", git_commit="", created="today"))
 
 
@@ -233,17 +163,7 @@ def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_pat
     assert ["3.400", "3.60", "5.88"] in [line[3:6] for line in lines]
 
 
-@pytest.mark.parametrize(
-    "values, texts",
-    [
-        ((9.5004, 0.4751), ["9.500", "0.475"]),  # three digits of the smallest
-        ((234.56, 12.3), ["234.6", "12.3"]),
-        ((0.00342, np.nan), ["0.003420", "–"]),
-        ((1e-12, 3.0), ["1e−12", "3"]),  # no number of decimals serves both
-        ((0.0, -0.0), ["0", "0"]),
-        ((-2.5, 2.5), ["−2.500", "2.500"]),
-    ],
-)
+@cases
 def test_a_column_has_the_decimals_that_its_numbers_need(values, texts):
     places = decimals(values)
-    assert [number(value, places) for value in values] == texts
+    assert [number(value, places) for value in values] == [*texts]

@@ -143,14 +143,7 @@ def own(tmp_path, monkeypatch):
     st.DEFINITIONS.discard("own")
 
 
-OWN = '''\
-from springtune.springs import Springs, definition
-
-@definition("own")
-def springs(mesh, material, thickness):
-    """Springs."""
-    return Springs(1.0, mesh.edge_lengths)  # one
-'''
+OWN = TABLES["own"]
 
 
 def test_ones_own_definition_counts_with_its_code_and_packages(own):
