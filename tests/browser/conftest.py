@@ -17,6 +17,7 @@ from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import STATUS
 
 from synthetic import LABELS, dataset
+from tables import beside
 
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
@@ -123,14 +124,10 @@ def small(tmp_path_factory):
     fields = groups["/fields"]
     forced = fields.displacement_x.isel(particle=0, drop=True) * xr.DataArray([-1e3, 0, 2e3], dims="spring")
     groups["/fields"] = fields.assign(force=forced.assign_attrs(units="N", long_name="force of each spring"))
-    groups["/weather"] = xr.Dataset(
-        {
-            "rain": (("town", "day"), [[1.0, np.nan, 3.0], [4.0, 5.0, 6.0]], {"units": "m", "long_name": "what fell"}),
-            "wind": ((), 3.5, {"units": "m/s"}),
-            "remark": (("town",), np.array(["wet", "dry"], dtype=object)),
-        },
-        {"town": ["here", "there"], "day": [1, 2, 3]},
-    )
+    rain = (("town", "day"), [[1.0, np.nan, 3.0], [4.0, 5.0, 6.0]], {"units": "m", "long_name": "what fell"})
+    weather = {"rain": rain, "wind": ((), 3.5, {"units": "m/s"})}
+    weather["remark"] = ("town",), np.array(["wet", "dry"], dtype=object)
+    groups["/weather"] = xr.Dataset(weather, {"town": ["here", "there"], "day": [1, 2, 3]})
     return written(tmp_path_factory.mktemp("small"), groups, title="<script>alert(1)</script>")
 
 
@@ -178,12 +175,7 @@ def samples_alone(tmp_path_factory):
 def cube(tmp_path_factory):
     """Page of 10,000 cells, each with a curve of 61 points and with every variable of the root."""
     random = np.random.default_rng(12)
-    axes = {
-        "beam": [f"{10 * i}x{2 * i}" for i in range(1, 11)], "mesh_type": ["structured", "free"],
-        "mesh_size": [1e-3, 2e-3, 3e-3, 4e-3, 5e-3], "material": [f"material {i}" for i in range(10)],
-        "load": ["traction", "compression", "bending", "shear", "pressure"], "definition": ["lattice"],
-        "kinematics": ["nonlinear", "linear"], "stiffness_ratio": list(np.geomspace(0.35, 1.4, 61)),
-    }  # fmt: skip
+    axes = beside(__file__)["cube"] | {"stiffness_ratio": list(np.geomspace(0.35, 1.4, 61))}
     root, curves = ROOT.empty(axes), SENSITIVITY.empty(axes)
     for data in (root, curves):
         for array in data.values():

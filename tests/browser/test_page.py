@@ -31,11 +31,8 @@ def views(browser):
 
 def show(browser, view):
     browser.ask("location.hash = `#view=${arguments[0]}`", view)
-    browser.wait(
-        "return springtune.opened === arguments[0]"
-        " && document.querySelector(`.view-${arguments[0]}`)?.childElementCount",
-        view,
-    )
+    filled = "document.querySelector(`.view-${arguments[0]}`)?.childElementCount"
+    browser.wait(f"return springtune.opened === arguments[0] && {filled}", view)
     browser.wait("return Promise.resolve(springtune.views[arguments[0]].plot?.drawn).then(() => true)", view)
 
 
@@ -53,19 +50,14 @@ class TestCube:
         assert 3000 < len(inside) < 4500  # of a normal distribution, 38 % are within half a standard deviation
         browser.driver.find_element(By.CSS_SELECTOR, ".filters [data-column=beam]").send_keys("40x8")
         browser.driver.find_element(By.CSS_SELECTOR, ".filters [data-column=status]").send_keys("solved")
-        rows = (
-            "const T = springtune.views.cells.table; return T.order.map((row) => T.columns.map((one) => one.text(row)))"
-        )
+        table = "const T = springtune.views.cells.table;"
+        rows = f"{table} return T.order.map((row) => T.columns.map((one) => one.text(row)))"
         names = browser.ask("return springtune.views.cells.table.columns.map((one) => one.name)")
         place = names.index("deformation_error")
         sort = browser.driver.find_elements(By.CSS_SELECTOR, ".list thead th button")[place]
         sort.send_keys(Keys.ENTER)
         found = browser.ask(rows)
-        assert (
-            found
-            and {row[0] for row in found} == {"40x8"}
-            and {row[names.index("status")] for row in found} == {"solved"}
-        )
+        assert {(row[0], row[names.index("status")]) for row in found} == {("40x8", "solved")}
         sizes = [abs(float(row[place].replace("−", "-"))) for row in found]
         assert sizes == sorted(sizes) and sizes[-1] <= 50
         heading = browser.ask("return document.querySelectorAll('.list thead th')[arguments[0]].ariaSort", place)
@@ -92,11 +84,8 @@ class TestSelection:
         before = browser.ask(f"return {CURVE}")
         ActionChains(browser.driver).send_keys(Keys.END).perform()
         browser.wait(f"return {CURVE} !== arguments[0]", before)
-        heading, after, address = (
-            browser.ask(f"return {HEADING}"),
-            browser.ask(f"return {CURVE}"),
-            browser.driver.current_url,
-        )
+        heading, after = browser.ask(f"return {HEADING}"), browser.ask(f"return {CURVE}")
+        address = browser.driver.current_url
         assert browser.ask("return document.querySelector('.list tr[aria-selected=true]').dataset.place") != "0"
         browser.open(address)  # a link to a cell works
         assert browser.ask(f"return {HEADING}") == heading and browser.ask(f"return {CURVE}") == after

@@ -134,7 +134,7 @@ class TestNew:
 
 
 class TestRun:
-    """What `springtune run` says before Snakemake starts; bad content is tests/workflow/test_bad_studies.py's."""
+    """What `springtune run` says before Snakemake starts; bad content is tests/workflow/test_reruns.py's."""
 
     @pytest.fixture(autouse=True)
     def studies(self, checkout):

@@ -10,7 +10,7 @@ import pytest
 
 import springtune as st
 
-from tables import cases
+from tables import cases, slow_but
 
 PAGE = " ".join((Path(__file__).parents[2] / "docs/which-numbers.md").read_text().split())
 SHEET = st.Beam("300 mm", "200 mm")
@@ -156,14 +156,11 @@ def kind(shape, load, quantity):
     return next(one.kind for one in asked if one.name == quantity)
 
 
-@pytest.mark.parametrize(
-    "row",
-    [
-        row if row[0].startswith(("`cook", "`hole")) else pytest.param(row, marks=pytest.mark.slow)
-        for row in rows("On the finest mesh")
-    ],
-    ids=lambda row: row[0],
-)
+FINEST = rows("On the finest mesh")
+SOON = [row for row in FINEST if row[0].startswith(("`cook", "`hole"))]
+
+
+@pytest.mark.parametrize("row", slow_but(SOON, FINEST), ids=lambda row: row[0])
 def test_errors_on_the_finest_mesh_are_those_of_the_page(row):
     shape, load, quantity = place(row[0])
     sizes = [one.mesh_size for one in study().shapes.scenes if one.shape == shape]

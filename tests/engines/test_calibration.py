@@ -13,6 +13,7 @@ from springtune.handover.newton import LAWS, membrane_energies
 from springtune.handover.simulation import simulate
 
 import engine_scenes
+from problems import asked, pulled
 
 QUESTIONS = 50
 
@@ -162,16 +163,9 @@ class TestClosedForm:
 
 
 def test_a_shape_is_calibrated_under_its_load_cases():
-    side = st.Quantity("end", "displacement", "right", "x")
-    pulls = {
-        name: st.LoadCase(
-            name,
-            [st.Support("left", x=0, y=0)],
-            [st.Traction("right", force)],
-            quantities=[st.Quantity("work", "energy"), st.Quantity("end", "displacement", "right", axis)],
-        )
-        for name, force, axis in (("pull", ("0.2 N", 0), "x"), ("lift", (0, "1 mN"), "y"))
-    }
+    work, side = asked(work="energy", end="displacement right x")
+    pulls = {"pull": pulled("0.2 N", 0, others=[work])}
+    pulls["lift"] = pulled(0, "1 mN", name="lift", components="y", others=[work])
     pulls["move"] = st.LoadCase("move", [st.Support("left", x=0, y=0), st.Support("right", x=1e-3)], quantities=[side])
     plate = st.Shape.rectangle("200 mm", "40 mm", loads=pulls)
     foam = st.Material("1 MPa", 0.3, density="1000 kg/m^3")

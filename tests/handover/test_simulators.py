@@ -12,7 +12,7 @@ from mechanics import spring_forces
 from springtune.handover.simulation import STABLE_STEP_SHARE, EquilibriumWarning
 from springtune.mesh import signed_areas
 
-from problems import pulled
+from problems import asked, pulled
 from tables import cases
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
@@ -419,21 +419,16 @@ def test_a_load_without_equilibrium_or_with_one_far_away_is_written_and_says_so(
 
 def holed(load, definition="lattice", material=STEEL, size="4 mm", **options):
     """A scene of a plate with a hole, under one of a few load cases."""
-    end = st.Quantity("end", "displacement", "right", "x")
+    end = asked(end="displacement right x")
     fixed, right = st.Support("left", x=0, y=0), st.Traction("right", ("2 kN", "200 N"))
     rollers = (st.Support("left", x=0), st.Support("corner", y=0))
     cases = (
-        st.LoadCase("pull", rollers, (right,), quantities=(end,)),
-        st.LoadCase("press", (fixed,), pressures=(st.Pressure("hole", "20 MPa"),), quantities=(end,)),
-        st.LoadCase("weigh", (fixed,), gravity=(1e5, -3e5), quantities=(end,)),
+        st.LoadCase("pull", rollers, (right,), quantities=end),
+        st.LoadCase("press", (fixed,), pressures=(st.Pressure("hole", "20 MPa"),), quantities=end),
+        st.LoadCase("weigh", (fixed,), gravity=(1e5, -3e5), quantities=end),
     )
-    plate = st.Shape.rectangle(
-        "60 mm",
-        "20 mm",
-        holes=[st.Hole.circle(("30 mm", "10 mm"), "5 mm")],
-        points={"corner": (0, 0)},
-        loads={case.name: case for case in cases},
-    )
+    loads, hole = {case.name: case for case in cases}, st.Hole.circle(("30 mm", "10 mm"), "5 mm")
+    plate = st.Shape.rectangle("60 mm", "20 mm", holes=[hole], points={"corner": (0, 0)}, loads=loads)
     return st.Scene(plate, st.mesh_shape(plate, size), material, load, definition=definition, **options)
 
 

@@ -22,19 +22,28 @@ RUBBER, STEEL = st.Material(1e6, 0.49, name="rubber"), st.Material(210e9, 0.3, n
 STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)
 
 
+def body_of(mesh, held, forces=None, modulus=1e6, thickness=1e-3, **options):
+    """A body of linear triangles, or of rectangles with areas."""
+    definition = "area" if len(mesh.quads) else "delingette"
+    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(modulus, 0.3, name="any"), thickness)
+    return Body(Network(mesh, held, springs.relative, springs.energies), springs.reference, forces, **options)
+
+
+def pressed_on(mesh, top, pressure):
+    """Forces of a pressure on edges that run along x, over the thickness of 1 mm."""
+    forces = np.zeros(mesh.points.shape)
+    np.add.at(forces[:, 1], top, -0.5 * pressure * 1e-3 * np.abs(np.diff(mesh.points[top, 0], axis=1)))
+    return forces
+
+
 def block(mesh_type, size, bottom, modulus=1e6, pressure=0.0, moves_little=True):
     """A block of 20 x 10 mm, free but for one particle that keeps its x, pressed on its upper face."""
     made = st.MESH_TYPES[mesh_type](0.02, 0.01, size)
     mesh = st.Mesh(made.points + [0, bottom], made.triangles, made.quads)
-    definition = "area" if len(mesh.quads) else "delingette"
-    springs = st.DEFINITIONS[definition].springs(mesh, st.Material(modulus, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.argmin(mesh.points.sum(axis=1)), 0] = True
-    top = mesh.outline_edges(1, mesh.points[:, 1].max())
-    forces = np.zeros(mesh.points.shape)
-    np.add.at(forces[:, 1], top, -0.5 * pressure * 1e-3 * np.abs(np.diff(mesh.points[top, 0], axis=1)))
-    network = Network(mesh, held, springs.relative, springs.energies)
-    return Body(network, springs.reference, forces=forces, moves_little=moves_little)
+    forces = pressed_on(mesh, mesh.outline_edges(1, mesh.points[:, 1].max()), pressure)
+    return body_of(mesh, held, forces, modulus, moves_little=moves_little)
 
 
 @cases
@@ -80,15 +89,11 @@ def half_disc(edge, largest=0.12, grading=0.3):
 def hertz(edge, half_width=0.06, **mesh):
     """Peak pressure and half width of a disc on a flat over Hertz's, E = 1, plane stress."""
     mesh = half_disc(edge, **mesh)
-    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1.0, 0.3, name="unit"), 1.0)
     held = np.zeros(mesh.points.shape, dtype=bool)
     top = mesh.outline_edges(1, 1.0)
     held[top, 0] = True
-    force = math.pi * half_width**2 / 4
-    forces = np.zeros(mesh.points.shape)
-    np.add.at(forces[:, 1], top, 0.5 * np.abs(np.diff(mesh.points[top, 0], axis=1)))
-    forces *= -force / forces.sum()
-    body = Body(Network(mesh, held, springs.relative, springs.energies), springs.reference, forces, moves_little=True)
+    force, forces = math.pi * half_width**2 / 4, pressed_on(mesh, top, 1.0)
+    body = body_of(mesh, held, -force / forces.sum() * forces, modulus=1.0, thickness=1.0, moves_little=True)
     contact = Contact([body], floor=True, size=edge)
     contact.solve(first=0.2)
     assert contact.contact_force()[1] == pytest.approx(force, rel=1e-9)
@@ -239,13 +244,10 @@ def pressed(mesh_type, size, obstacle, pressure):
     """A block of 20 x 10 mm whose upper face keeps its x, pressed on an obstacle, not quite in its middle."""
     made = st.MESH_TYPES[mesh_type](0.02, 0.01, size)
     mesh = st.Mesh(made.points - [0.01 - 0.13e-3, 0], made.triangles)
-    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1e6, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     top = mesh.outline_edges(1, mesh.points[:, 1].max())
     held[np.unique(top), 0] = True
-    forces = np.zeros(mesh.points.shape)
-    np.add.at(forces[:, 1], top, -0.5 * pressure * 1e-3 * np.abs(np.diff(mesh.points[top, 0], axis=1)))
-    body = Body(Network(mesh, held, springs.relative, springs.energies), springs.reference, forces)
+    body = body_of(mesh, held, pressed_on(mesh, top, pressure))
     return Contact([body], [obstacle], size=size)
 
 
@@ -283,12 +285,11 @@ def draped(corners, size):
     """A sheet of 60 x 4 mm draped over a segment of a circle by its weight."""
     made = st.MESH_TYPES["structured"](0.06, 0.004, size)
     mesh = st.Mesh(made.points - [0.03, 0], made.triangles)
-    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1e6, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.abs(mesh.points).sum(axis=1).argmin(), 0] = True
     weights = -0.3 * mesh.particle_areas / mesh.area
     forces = np.stack([np.zeros(len(weights)), weights], axis=1)
-    body = Body(Network(mesh, held, springs.relative, springs.energies), springs.reference, forces)
+    body = body_of(mesh, held, forces)
     contact = Contact([body], [cap(0.02, 1.0, corners)], size=size)
     contact.solve(first=1e-2)
     return contact
@@ -330,12 +331,10 @@ def test_a_force_along_the_floor_slips_at_the_limit():
 def test_sliding_friction_is_the_normal_force_times_the_coefficient(way):
     """A block pressed down by its upper face and pushed aside: all of the force that Coulomb allows, against it."""
     made = st.MESH_TYPES["structured"](0.02, 0.004, 2e-3)
-    springs = st.DEFINITIONS["delingette"].springs(made, st.Material(1e6, 0.3, name="any"), 1e-3)
     top = made.points[:, 1] > 0.004 - 1e-9
     held = np.repeat(top[:, None], 2, axis=1)
     prescribed = np.where(held, [way * 1e-3, -2e-5], 0.0)
-    network = Network(made, held, springs.relative, springs.energies)
-    contact = Contact([Body(network, springs.reference, prescribed=prescribed)], floor=True, size=2e-3, friction=0.3)
+    contact = Contact([body_of(made, held, prescribed=prescribed)], floor=True, size=2e-3, friction=0.3)
     contact.solve(first=0.25)
     along, normal = contact.contact_force()
     assert normal > 0
@@ -355,7 +354,6 @@ def capstan(friction, wrap, size, radius=1e-2, thickness=4e-4, ratio=0.2):
     out, over = radius * (1 + 1e-6) + made.points[:, 1], along - angle * radius
     points = np.stack([out * np.sin(angle) + over * np.cos(angle), out * np.cos(angle) - over * np.sin(angle)], axis=1)
     mesh = st.Mesh(points, made.triangles)
-    springs = st.DEFINITIONS["delingette"].springs(mesh, st.Material(1e6, 0.3, name="any"), 1e-3)
     held = np.repeat((along < along.min() + 1e-9)[:, None], 2, axis=1)
     end = np.flatnonzero(along > along.max() - 1e-9)
     end = end[np.argsort(made.points[end, 1])]
@@ -366,7 +364,7 @@ def capstan(friction, wrap, size, radius=1e-2, thickness=4e-4, ratio=0.2):
     np.add.at(forces, end[1:], 0.5 * edges * pull)
     angles = np.linspace(0.5 * wrap + 0.2, -0.5 * wrap - 0.2, round((wrap + 0.4) * radius / (ratio * size)) + 1)
     arc = radius * np.stack([np.sin(angles), np.cos(angles)], axis=1)
-    body = Body(Network(mesh, held, springs.relative, springs.energies), springs.reference, forces)
+    body = body_of(mesh, held, forces)
     contact = Contact([body], [Obstacle(np.vstack([arc, [[0, -0.5 * radius]]]))], size=size, friction=friction)
     contact.solve(first=1.0)
     holding = -(contact.contact_force() + pull)

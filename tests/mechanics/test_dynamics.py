@@ -19,6 +19,8 @@ from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL, BENDING
 from springtune.springs.lattice import uniform
 
+from problems import CountedNetwork
+
 STEEL = st.Material(210e9, 0.3, name="steel")
 DENSITY = 7850.0
 THICKNESS = 1e-3
@@ -405,18 +407,8 @@ def test_a_thread_that_fails_ends_the_others(broken):
     stepper.close()
 
 
-class Counted(Network):
-    """A network that counts the matrices that it factorizes."""
-
-    taken = 0
-
-    def factorize_matrix(self, *arguments, **options):
-        self.taken += 1
-        return super().factorize_matrix(*arguments, **options)
-
-
 def test_an_explicit_run_to_rest_factorizes_once():
-    motion = beam(network_type=Counted)
+    motion = beam(network_type=CountedNetwork)
     for integrator in EXPLICIT:
         assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200).status == "moving"
     assert motion.network.taken == 0

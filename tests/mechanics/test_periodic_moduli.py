@@ -96,12 +96,8 @@ def test_it_lies_between_even_tractions_and_even_displacements(seed):
         forces = network.reduce(outline_forces(mesh, np.array(stress, dtype=float)))
         gradient = mean_gradient(mesh, network.expand(network.rest_factor.solve(forces)))
         compliance.append([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
-    order = [
-        np.linalg.inv(compliance),
-        periodic_stiffness(mesh, copied, springs),
-        PatchTest(mesh).stiffness(springs),
-        affine_stiffness(mesh, springs),
-    ]
+    order = [np.linalg.inv(compliance), periodic_stiffness(mesh, copied, springs)]
+    order += [PatchTest(mesh).stiffness(springs), affine_stiffness(mesh, springs)]
     for softer, stiffer in zip(order, order[1:]):
         assert np.linalg.eigvalsh(stiffer - softer)[0] > 1e-4  # and none of them is equal
 

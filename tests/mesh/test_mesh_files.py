@@ -60,12 +60,8 @@ INP = f"*HEADING\nplate\n{MESH}{SETS}"
 def blocks(hard="", soft=""):
     """Elements in four blocks."""
     lines = [one.splitlines(keepends=True) for one in (CPS4, CPS3)]
-    parts = [
-        ("CPS4", hard, lines[0][:2]),
-        ("CPS4", soft, lines[0][2:]),
-        ("CPS3", soft, lines[1][4:]),
-        ("CPS3", hard, lines[1][:4]),
-    ]
+    parts = [("CPS4", hard, lines[0][:2]), ("CPS4", soft, lines[0][2:])]
+    parts += [("CPS3", soft, lines[1][4:]), ("CPS3", hard, lines[1][:4])]
     return "".join(f"*ELEMENT, TYPE={kind}{name}\n{''.join(found)}" for kind, name, found in parts)
 
 

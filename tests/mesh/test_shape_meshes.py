@@ -16,7 +16,7 @@ from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
 from springtune.problem.boundary import check_case
 
-from tables import beside, evaluated
+from tables import beside, cases, evaluated
 
 
 def plate(**more):
@@ -155,11 +155,9 @@ def same(grouped, other):
             name: sum(float(signed_areas(one.mesh.points, one.mesh.cells[n])[mask].sum()) for n, mask in masks.items())
             for name, masks in one.parts.items()
         }
-        return (
-            {name: sorted(map(tuple, found.tolist())) for name, found in edges.items()},
-            {name: tuple(np.round(place, 12)) for name, place in one.points.items()},
-            {name: round(area, 15) for name, area in cells.items()},
-        )
+        sides = {name: sorted(map(tuple, found.tolist())) for name, found in edges.items()}
+        points = {name: tuple(np.round(place, 12)) for name, place in one.points.items()}
+        return sides, points, {name: round(area, 15) for name, area in cells.items()}
 
     return places(grouped) == places(other) and other.mesh.area == pytest.approx(grouped.mesh.area)
 
@@ -270,13 +268,7 @@ def test_names_that_cannot_be_used_are_told(tmp_path):
 
 
 @pytest.mark.usefixtures("mesh_library")
-@pytest.mark.parametrize(
-    ("write", "says"),
-    [
-        (lambda g: write_mesh("a.vtk", g), "give a name that ends in .vtu"),
-        (lambda g: write_mesh("a.vtu", st.GroupedMesh(g.mesh, {"part": g.sides["left"]})), "is named 'part', by which"),
-    ],
-)
+@cases
 def test_files_that_cannot_hold_a_group_are_not_written(tmp_path, monkeypatch, write, says):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(st.MeshError) as caught:

@@ -12,7 +12,7 @@ from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
 
-from problems import pulled
+from problems import asked, outline, pulled
 
 BEAM = st.Beam("200 mm", "40 mm")
 STEEL = st.Material("210 GPa", 0.3, plane="strain", name="steel")
@@ -97,14 +97,9 @@ def test_a_ring_under_pressure_widens_as_lame_says():
     """A quarter of a thick pipe; the mean of u cos over the bore is 2 / pi of the radial displacement."""
     inner, outer, pressure = 0.01, 0.03, 1e6
     corners = [(inner, 0.0), (outer, 0.0), (0.0, outer), (0.0, inner)]
-    centres, names = (None, (0.0, 0.0)) * 2, ("lower", "outer", "left", "bore")
-    sides = [st.Segment(at, centre=centre, group=name) for at, centre, name in zip(corners, centres, names)]
-    burst = st.LoadCase(
-        "burst",
-        (st.Support("lower", y=0.0), st.Support("left", x=0.0)),
-        pressures=(st.Pressure("bore", pressure),),
-        quantities=(st.Quantity("bore", "displacement", "bore", "x"),),
-    )
+    sides = outline(*zip(corners, ("lower", "outer", "left", "bore"), (None, (0.0, 0.0)) * 2))
+    rollers, bore = [st.Support("lower", y=0.0), st.Support("left", x=0.0)], asked(bore="displacement bore x")
+    burst = st.LoadCase("burst", rollers, pressures=[st.Pressure("bore", pressure)], quantities=bore)
     found = solve_shape(st.Shape("pipe", 1e-3, sides, loads={"burst": burst}), burst, {"": STEEL}).values["bore"]
     young, nu, square = 210e9, 0.3, inner**2 / (outer**2 - inner**2)
     widened = (1 + nu) / young * pressure * square * ((1 - 2 * nu) * inner + outer**2 / inner)

@@ -92,13 +92,9 @@ def test_a_clockwise_outline_is_turned(count, first, inner):
 def test_what_is_around_a_round_is_the_smallest_part():
     rings = [st.Hole.circle((0.5, 0.5), radius, part=f"r{radius}") for radius in (0.2, 0.4, 0.3)]
     nested = st.Shape.rectangle(1, 1, holes=[*rings, st.Hole.circle((0.5, 0.5), 0.1)])
-    assert [(one.inner, one.outer, one.around) for one in nested.rounds] == [
-        ("", None, None),
-        ("r0.2", "r0.3", 3),
-        ("r0.4", "", 0),
-        ("r0.3", "r0.4", 2),
-        (None, "r0.2", 1),
-    ]
+    found = [(one.inner, one.outer, one.around) for one in nested.rounds]
+    around = ("r0.2", "r0.3", 3), ("r0.4", "", 0), ("r0.3", "r0.4", 2), (None, "r0.2", 1)
+    assert found == [("", None, None), *around]
     assert [nested.part_at((x, 0.5)) for x in (0.05, 0.15, 0.25, 0.35, 0.5, 2.0)] == [
         "", "r0.4", "r0.3", "r0.2", None, None
     ]  # fmt: skip

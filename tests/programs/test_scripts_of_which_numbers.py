@@ -89,12 +89,8 @@ def test_newton(solver):
     exec(code.replace("SolverVBD", f"Solver{solver}"), names)
     model, made = names["model"], names["solver"]
     assert model.particle_mass.numpy()[NODES[1:]] == pytest.approx(MASSES[NODES[1:]], rel=1e-5)
-    step, now, after, control = (
-        1 / 60 / (40 if solver == "VBD" else 80),
-        model.state(),
-        model.state(),
-        model.control(),
-    )
+    step, control = 1 / 60 / (40 if solver == "VBD" else 80), model.control()
+    now, after = model.state(), model.state()
     rest, forces = now.particle_q.numpy().copy(), np.pad(FORCES, ((0, 0), (0, 1))).astype(np.float32)
     for _ in range(round(0.4 / step)):
         now.particle_f.assign(forces)

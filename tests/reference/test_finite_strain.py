@@ -18,6 +18,7 @@ from springtune.reference.finite_strain import FiniteStrainError, law_of, solve_
 from springtune.reference.shapes import solve_shape
 from springtune.reference.small_strain import solve_small_strain
 
+from problems import asked, outline
 from tables import cases
 
 BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")
@@ -112,15 +113,7 @@ def test_small_strain_is_the_limit_of_any_shape(kind, stress, nu, aspect_ratio):
     assert abs(finite.displacement / small.displacement - 1) <= finite.error_estimate + 1e-5
 
 
-@pytest.mark.parametrize(
-    ("nu", "load"),
-    [
-        # Other loads and the largest one are slow.
-        (0.3, 1.0),
-        (0.5, 1.0),
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.0, 0.5), (0.0, 2.0), (0.5, 2.0), (0.0, 5.0))),
-    ],
-)
+@cases
 def test_slender_cantilevers_are_elasticas(nu, load):
     """The clamp shortens a beam by up to .014 of its height; as in small strain, which then takes shear along."""
     apart = []
@@ -177,11 +170,7 @@ RUBBER = st.Material("1 MPa", 0.5, name="rubber")
 PLY = st.AnisotropicMaterial.orthotropic("1 MPa", "0.3 MPa", 0.3, "0.2 MPa", name="ply")
 ROLLERS = st.Support("left", x=0), st.Support("lower", y=0)
 CLAMP = (st.Support("left", x=0, y=0),)
-END, AREA, ENERGY = (
-    st.Quantity("end", "displacement", "right", "x"),
-    st.Quantity("area", "area"),
-    st.Quantity("energy", "energy"),
-)
+END, AREA, ENERGY = asked(end="displacement right x", area="area", energy="energy")
 LENGTH, HEIGHT, THICKNESS = 0.1, 0.04, 1e-3
 
 
@@ -314,11 +303,8 @@ def test_small_strain_stays_where_it_applies():
     case = pull(0.1, CLAMP, (END,))
     shape = plate(case)
     scene = partial(st.Scene, shape, st.mesh_shape(shape, "10 mm"), RUBBER, "pull")
-    assert [scene(definition=name).finite_strain for name in ("neo-hooke", "delingette", "area")] == [
-        True,
-        False,
-        False,
-    ]
+    found = [scene(definition=name).finite_strain for name in ("neo-hooke", "delingette", "area")]
+    assert found == [True, False, False]
     assert not scene(definition="neo-hooke", kinematics="linear").finite_strain
 
 
@@ -343,15 +329,10 @@ def test_what_is_not_stable_says_where_it_ends():
 
 
 def cook(force):
-    outline = [
-        st.Segment((0, 0)),
-        st.Segment((0.048, 0.044), group="right"),
-        st.Segment((0.048, 0.060), group="upper"),
-        st.Segment((0, 0.044), group="left"),
-    ]
-    tip = (st.Quantity("tip", "displacement", "tip", "y"), st.Quantity("end", "displacement", "right", "y"))
+    sides = outline(((0, 0), ""), ((0.048, 0.044), "right"), ((0.048, 0.060), "upper"), ((0, 0.044), "left"))
+    tip = asked(tip="displacement tip y", end="displacement right y")
     case = st.LoadCase("shear", CLAMP, [st.Traction("right", (0, force))], quantities=tip)
-    return st.Shape("cook", THICKNESS, outline, points={"tip": (0.048, 0.060)}, loads={"shear": case}), case
+    return st.Shape("cook", THICKNESS, sides, points={"tip": (0.048, 0.060)}, loads={"shear": case}), case
 
 
 @cases

@@ -15,7 +15,7 @@ from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 from springtune.reference.triangles import side_fit, side_functions, tabulated
 
-from problems import pulled
+from problems import asked, pulled
 from tables import slow_but
 
 STEEL = st.Material(210e9, 0.3, density=7850.0, name="steel")
@@ -158,12 +158,8 @@ def test_patch(name):
 def test_kirsch():
     """A quarter of a plate with a hole under the tractions of the plate without end: stress concentration 3."""
     shape, material = others.holed_plate()
-    quantities = (
-        st.Quantity("top", "stress", "top-of-the-hole", "xx"),
-        st.Quantity("side", "stress", "side-of-the-hole", "yy"),
-        st.Quantity("out", "displacement", "side-of-the-hole", "x"),
-    )
-    load = replace(shape.loads["pull"], quantities=quantities)
+    out = asked(side="stress side-of-the-hole yy", out="displacement side-of-the-hole x")
+    load = replace(shape.loads["pull"], quantities=[*asked(top="stress top-of-the-hole xx"), *out])
 
     def pull(points, normals):
         stress = others.kirsch(points, 0.01, 1e6, material)[1]
@@ -301,13 +297,8 @@ def test_a_round_inclusion():
     shape = st.Shape("disc", thickness, disc(outer, "rim"), (st.Hole(disc(inner), "core"),), points={"out": (0.6, 0.2)})
     quantities = (st.Quantity("energy", "energy"), st.Quantity("out", "displacement", "out", "x"))
     load = st.LoadCase("grow", (st.Support("rim", 1.0, 1.0),), quantities=quantities)
-    found = converge(
-        shape,
-        load,
-        {"": around, "core": core},
-        displacements={"rim": lambda points, _: strain * points},
-        tolerance=1e-6,
-    )
+    even = {"rim": lambda points, _: strain * points}
+    found = converge(shape, load, {"": around, "core": core}, displacements=even, tolerance=1e-6)
     work = np.pi * outer**2 * strain * thickness * (even * b - odd * c / outer**2)
     assert found.values["energy"] == pytest.approx(work, rel=1e-6)
     r = np.hypot(0.6, 0.2)

@@ -212,15 +212,8 @@ def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, s
     assert (call.here / "results/mine/index.html").stat().st_size > 100_000
     again = call("springtune", "run", "mine.yaml", **read_only)
     assert again.returncode == 0 and "results/mine is complete" in again.stdout
-    assert not call(
-        "springtune",
-        "export",
-        "results/mine",
-        "--to",
-        "mine.csv",
-        *(("--group", "shapes") if shape else ()),
-        **read_only,
-    ).returncode
+    group = ("--group", "shapes") if shape else ()
+    assert not call("springtune", "export", "results/mine", "--to", "mine.csv", *group, **read_only).returncode
     assert {path: path.stat().st_mtime_ns for path in empty.parent.rglob("*")} == before
 
 

@@ -1,9 +1,16 @@
-"""Input that is refused, and what it said or did before it was: found by the targets of tests/fuzz, or by people."""
+"""Files that appear whole or not at all; and input that is refused, and what it said or did before it was.
+
+Found by the targets of tests/fuzz, or by people.
+"""
 
 import os
+import platform
 import re
 import shutil
 import struct
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import h5py
@@ -15,8 +22,9 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.mesh import braced, lattice, read_beam_mesh, right
+from springtune.mesh import braced, lattice, read_beam_mesh, right, write_mesh
 from springtune.mesh.formats import read_shape
+from springtune.safe_io import atomic
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import write
 
@@ -213,20 +221,12 @@ class TestOfOtherKinds:
             path.symlink_to(request.param)
         return path
 
-    TEXTS = {
-        "rows": SMALL.replace("beam: a}", "beam: a, rows: odd.csv}"),
-        "printed": SMALL + "printed: odd.csv\n",
-        "uniaxial_test": SMALL.replace("young_modulus: 210 GPa, poisson_ratio: 0.3", "uniaxial_test: odd.csv"),
-        "mesh_files": SMALL.replace("mesh_type: structured", "mesh_type: own")
-        + "mesh_files: {own: [{file: odd.csv, beam: a, mesh_size: 5 mm}]}\n",
-    }
-
-    @pytest.mark.parametrize("key", TEXTS)
-    def test_a_file_that_a_study_names(self, tmp_path, odd, key):
-        (tmp_path / "study.yaml").write_text(self.TEXTS[key])
-        with pytest.raises(
-            st.StudyError, match="odd.csv'.*(a pipe or a device, not a file|Is a directory|not a file); "
-        ):
+    @cases
+    def test_a_file_that_a_study_names(self, tmp_path, odd, old, new, more):
+        assert old in SMALL
+        (tmp_path / "study.yaml").write_text(SMALL.replace(old, new) + more)
+        says = "odd.csv'.*(a pipe or a device, not a file|Is a directory|not a file); "
+        with pytest.raises(st.StudyError, match=says):
             st.load_study(tmp_path / "study.yaml")
 
     @cases
@@ -331,3 +331,62 @@ class TestDatasets:
         told = CliRunner().invoke(main, ["info", str(path)])
         assert told.exit_code == 1 and isinstance(told.exception, SystemExit), told.output
         assert len(told.output.splitlines()) == 1 and str(path) in told.output and says in told.output
+
+
+def test_two_processes_never_write_one_file(tmp_path):
+    with atomic.replacing(tmp_path / "note.txt") as unfinished:
+        assert unfinished.name == f"note.txt.{os.getpid()}@{platform.node().replace('.', '-')}.unfinished"
+        unfinished.write_text("whole")
+    assert [path.name for path in tmp_path.iterdir()] == ["note.txt"]
+
+
+def test_an_error_leaves_what_was_there(tmp_path):
+    atomic.write_text(tmp_path / "note.txt", "of before")
+    with pytest.raises(ZeroDivisionError), atomic.replacing(tmp_path / "note.txt", synced=True) as unfinished:
+        unfinished.write_text("half of")
+        _ = 1 / 0
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["of before"]
+
+
+def test_an_unfinished_mesh_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "replace", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_mesh(tmp_path / "mesh.vtu", st.MESH_TYPES["right"](0.05, 0.02, 1e-2))
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_dead_left_is_swept_and_what_the_living_write_stays(tmp_path):
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as living:
+        kept = tmp_path / "deep" / f"a.h5.{living.pid}.unfinished"
+        atomic.write_text(kept, "half of")
+        for name in ("deep/a.h5.99999999.unfinished", "b.unfinished", "c.x.unfinished", f"d.{10**30}.unfinished"):
+            atomic.write_text(tmp_path / name, "half of")
+        atomic.write_text(tmp_path / "deep/unfinished.txt", "whole")
+        atomic.remove_unfinished(tmp_path, below=False)
+        assert [path.name for path in tmp_path.iterdir()] == ["deep"] and len(list((tmp_path / "deep").iterdir())) == 3
+        atomic.remove_unfinished(tmp_path)
+        assert {path.name for path in (tmp_path / "deep").iterdir()} == {kept.name, "unfinished.txt"}
+        living.communicate(b"\n")
+    atomic.remove_unfinished(tmp_path)
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["unfinished.txt"]
+
+
+def test_what_another_machine_writes_stays_for_an_hour(tmp_path):
+    """Its processes are not to be seen, and one of this machine may have the same number."""
+    (tmp_path / f"a.h5.{os.getpid()}@elsewhere.unfinished").write_text("half of")
+    (tmp_path / "b.h5.99999999@else-where.unfinished").write_text("half of")
+    atomic.remove_unfinished(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+    for path in tmp_path.iterdir():
+        os.utime(path, (time.time() - atomic.ABANDONED_SECONDS - 1,) * 2)
+    atomic.remove_unfinished(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_dead_that_nobody_waits_for_write_nothing(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    os.waitid(os.P_PID, dead.pid, os.WEXITED | os.WNOWAIT)
+    atomic.write_text(tmp_path / f"note.txt.{dead.pid}.unfinished", "half of")
+    atomic.remove_unfinished(tmp_path)
+    assert not list(tmp_path.iterdir())
+    dead.wait()

@@ -11,7 +11,7 @@ from springtune.reference.shapes import solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.springs.identification import patch_cases
 
-from problems import pulled
+from problems import CLAMP, asked, outline, pulled
 from tables import cases
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
@@ -22,13 +22,9 @@ BOARD = st.AnisotropicMaterial("14 GPa", "9 GPa", "3 GPa", "4 GPa", density="600
 
 STRESSES = [st.Quantity(name, "stress", of, "xx") for name, of in (("in_core", "core"), ("beside", "beside"))]
 PULL = pulled("100 N", 0.0, others=[st.Quantity("held", "reaction", "left", "x"), *STRESSES])
-PLATE = st.Shape.rectangle(
-    0.1,
-    0.04,
-    holes=[st.Hole.circle((0.05, 0.02), 0.008), st.Hole.circle((0.08, 0.025), 0.006, part="core")],
-    points={"core": (0.08, 0.025), "beside": (0.02, 0.01)},
-    loads={"pull": PULL},
-)
+HOLES = st.Hole.circle((0.05, 0.02), 0.008), st.Hole.circle((0.08, 0.025), 0.006, part="core")
+POINTS = {"core": (0.08, 0.025), "beside": (0.02, 0.01)}
+PLATE = st.Shape.rectangle(0.1, 0.04, holes=HOLES, points=POINTS, loads={"pull": PULL})
 
 
 @pytest.fixture(scope="module")
@@ -104,13 +100,8 @@ def test_what_is_zero_by_symmetry_has_no_relative_error():
 
 
 def holed(radius, *, outline=True, part=""):
-    case = st.LoadCase(
-        "push",
-        (st.Support("left", x=0.0, y=0.0),),
-        pressures=(st.Pressure("upper", "1 MPa", follower=True),),
-        quantities=(st.Quantity("end", "displacement", "right", "y"),),
-    )
-    loads = {"push": case}
+    pressure, end = st.Pressure("upper", "1 MPa", follower=True), asked(end="displacement right y")
+    loads = {"push": st.LoadCase("push", CLAMP, pressures=[pressure], quantities=end)}
     if not outline:
         return st.Shape("plate", 1e-3, file="plate.msh", loads=loads)
     holes = [st.Hole.circle((0.05, 0.02), radius, part=part)]
@@ -122,15 +113,11 @@ class TestMeshOfAnotherShape:
 
     @pytest.mark.parametrize(("size", "refined"), [(0.02, {}), (2e-3, {"hole": 5e-4})])
     def test_its_own_mesh_however_coarse_is_taken(self, size, refined):
-        outline = (
-            st.Segment((0.02, 0.0), group="lower"),
-            st.Segment((0.06, 0.0), group="right"),
-            st.Segment((0.05, 0.04), centre=(0.0, 0.0), group="arc"),
-            st.Segment((0.0, 0.05), group="left"),
-            st.Segment((0.0, 0.03), centre=(0.0, 0.0), group="inner"),
-        )
+        arcs = ((0.05, 0.04), "arc", (0.0, 0.0)), ((0.0, 0.03), "inner", (0.0, 0.0))
+        straight = ((0.02, 0.0), "lower"), ((0.06, 0.0), "right"), ((0.0, 0.05), "left")
+        sides = outline(*straight[:2], arcs[0], straight[2], arcs[1])
         nested = [st.Hole.circle((0.03, 0.03), 0.01, part="ring"), st.Hole.ellipse((0.03, 0.03), 0.006, 0.003)]
-        shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": pulled(1.0, 0.0)})
+        shape = st.Shape("knee", 1e-3, sides, nested, loads={"pull": pulled(1.0, 0.0)})
         steel = {"ring": STEEL, "": STEEL}
         assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), steel, "pull", definition="lattice")
 

@@ -16,7 +16,7 @@ from springtune.mechanics.stress import cell_stresses, particle_stresses
 from springtune.problem.boundary import cell_at, displacement_weights, forces
 from springtune.problem.geometry import AssumptionWarning
 
-from problems import free_network
+from problems import asked, free_network
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("210 GPa", 1 / 3, name="third")
@@ -59,16 +59,9 @@ class TestAffineFields:
             "energy": 0.5 * self.force * self.stress / 210e9 * LENGTH,
             "area": self.stress / 210e9 * 0.7 * LENGTH * HEIGHT,
         }
-        quantities = [
-            END,
-            st.Quantity("side", "displacement", "somewhere", "y"),
-            st.Quantity("held", "reaction", "left", "x"),
-            st.Quantity("xx", "stress", "somewhere", "xx"),
-            st.Quantity("energy", "energy"),
-            st.Quantity("area", "area"),
-            st.Quantity("yy", "stress", "corner", "yy"),
-        ]
-        pull = load(*quantities, tractions=[st.Traction("right", (self.force, 0.0))])
+        stresses = asked(xx="stress somewhere xx", yy="stress corner yy")
+        whole = asked(side="displacement somewhere y", held="reaction left x", energy="energy", area="area")
+        pull = load(END, *whole, *stresses, tractions=[st.Traction("right", (self.force, 0.0))])
         shape = plate(pull, points={"somewhere": (0.037, 0.013), "corner": (0.0, 0.04)})
         found = solved(shape, st.mesh_shape(shape, 6e-3), kinematics=kinematics, scale=size)
         assert abs(found.values.pop("yy")) < 1e-8 * size * self.stress
@@ -83,12 +76,8 @@ class TestAffineFields:
         sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
         sides["lower"] = mesh.outline_edges(1, 0.0)
         grouped = st.GroupedMesh(mesh, sides, {"somewhere": np.array([0.037, 0.013])})
-        pull = load(
-            END,
-            st.Quantity("side", "displacement", "somewhere", "y"),
-            st.Quantity("xx", "stress", "somewhere", "xx"),
-            tractions=[st.Traction("right", (self.force, 0.0))],
-        )
+        inside = asked(side="displacement somewhere y", xx="stress somewhere xx")
+        pull = load(END, *inside, tractions=[st.Traction("right", (self.force, 0.0))])
         shape = plate(pull, points={"somewhere": (0.037, 0.013)})
         values = solved(shape, grouped, THIRD, "lattice").values
         assert values["end"] == pytest.approx(self.stress / 210e9 * LENGTH, rel=1e-9)
@@ -106,11 +95,8 @@ class TestAffineFields:
 
 def test_a_rigid_motion_takes_no_force():
     """All that is prescribed: a residual has no load to be over."""
-    move = load(
-        st.Quantity("middle", "displacement", "middle", "x"),
-        st.Quantity("energy", "energy"),
-        supports=(st.Support("left", x=1e-3, y=2e-3), st.Support("right", x=1e-3, y=2e-3)),
-    )
+    supports = [st.Support(side, x=1e-3, y=2e-3) for side in ("left", "right")]
+    move = load(*asked(middle="displacement middle x", energy="energy"), supports=supports)
     shape = plate(move, points={"middle": (0.05, 0.02)})
     for kinematics in ("linear", "nonlinear"):
         values = solved(shape, st.mesh_shape(shape, 8e-3), kinematics=kinematics).values
@@ -165,14 +151,10 @@ def test_a_path_of_prescribed_displacements():
 class TestEquilibrium:
     """Whatever is pulled, pushed and heavy: supports carry it, moments included."""
 
-    case = load(
-        END,
-        st.Quantity("energy", "energy"),
-        supports=CLAMP,
-        tractions=[st.Traction("right", (300.0, -200.0)), st.Traction("tip", (0.0, -100.0))],
-        pressures=[st.Pressure("upper", 2e4), st.Pressure("hole", 1e5, follower=True)],
-        gravity=(0.0, -9.81),
-    )
+    tractions = [st.Traction("right", (300.0, -200.0)), st.Traction("tip", (0.0, -100.0))]
+    forces = {"tractions": tractions, "gravity": (0.0, -9.81)}
+    forces["pressures"] = [st.Pressure("upper", 2e4), st.Pressure("hole", 1e5, follower=True)]
+    case = load(END, *asked(energy="energy"), supports=CLAMP, **forces)
     shape = plate(case, points={"tip": (LENGTH, HEIGHT)}, holes=[st.Hole.circle((0.05, 0.02), 0.008)])
     soft = st.Material("1 GPa", 0.3, density="7850 kg/m^3")
 

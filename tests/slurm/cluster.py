@@ -103,17 +103,8 @@ def cluster(folder):
                 MUNGE.mkdir(mode=0o755)
                 stack.callback(shutil.rmtree, MUNGE)
                 shutil.chown(MUNGE, "munge", "munge")
-            stack.enter_context(
-                _running(
-                    "setpriv",
-                    "--reuid=munge",
-                    "--regid=munge",
-                    "--clear-groups",
-                    "munged",
-                    "--foreground",
-                    log=folder / "munged.out",
-                )  # fmt: skip
-            )
+            munged = "setpriv --reuid=munge --regid=munge --clear-groups munged --foreground"
+            stack.enter_context(_running(*munged.split(), log=folder / "munged.out"))
             until(lambda: not subprocess.run(["munge", "-n"], capture_output=True).returncode)
         stack.enter_context(_running("slurmctld", "-D", "-c", log=folder / "slurmctld.out"))
         for name in NODES:

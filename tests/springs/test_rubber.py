@@ -195,18 +195,8 @@ def test_strains_are_nominal_or_refused(tmp_path, measure, scale, points, heads)
 @pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
 def test_stresses_are_nominal_or_refused(tmp_path, separator, decimal):
     stresses = st.Rubber((0.2,)).stress("uniaxial", FAR)
-    assert (
-        misread(
-            tmp_path,
-            [("stretch", head) for head in written_out(HEADS["stresses"])],
-            FAR,
-            FAR,
-            stresses,
-            separator,
-            decimal,
-        )
-        == []
-    )
+    pairs = [("stretch", head) for head in written_out(HEADS["stresses"])]
+    assert misread(tmp_path, pairs, FAR, FAR, stresses, separator, decimal) == []
 
 
 LONG_CELL = f"stretch,stress [MPa]\n1.1,{'1' * 131_073}\n", "line 2: a cell has over 131072 characters; correct it"

@@ -73,6 +73,16 @@ class Scene:
         return st.Material(self.young_modulus, self.poisson_ratio, name="drawn")
 
 
+def names_of(corners, later, uniaxial=False):
+    """Definitions for cells of so many corners; that of tested rubber, alone, is none of them."""
+    return [
+        name
+        for name, one in st.DEFINITIONS.items()
+        if corners in one.cells and (uniaxial or not one.uniaxial) and one.needs in ("", "stiffness")
+        if name != "yeoh" and (name in LATER) == later
+    ]
+
+
 def draw(seed, number, later=False):
     """Scene of a seed and a number, of a definition that is one of `LATER` or is not."""
     rng = np.random.default_rng([seed, number])
@@ -80,15 +90,7 @@ def draw(seed, number, later=False):
     corners = 4 if mesh_type == "braced" else 3
     load = str(rng.choice(list(st.LOADS)))
     kind = st.LOADS[load].kind.name
-    names = [
-        name
-        for name, definition in st.DEFINITIONS.items()
-        if corners in definition.cells
-        and (st.LOADS[load].kind.uniaxial or not definition.uniaxial)
-        and definition.needs in ("", "stiffness")
-        and name != "yeoh"  # of tested rubber alone
-        and (name in LATER) == later
-    ]
+    names = names_of(corners, later, uniaxial=st.LOADS[load].kind.uniaxial)
     if not later and mesh_type not in ("isosceles-0.3", "isosceles-0.5", "braced"):
         names.remove("axis-exact")  # it lives on these alone
     # What is found by optimisation takes a second to derive, a hundred times as long as all else.
@@ -140,15 +142,7 @@ def draw_snap(seed, number, later=False):
         load = "follower-pressure"
     if form == "straight":
         load = "shortening"
-    names = [
-        name
-        for name, definition in st.DEFINITIONS.items()
-        if 3 in definition.cells
-        and not definition.uniaxial
-        and definition.needs in ("", "stiffness")
-        and name not in ("yeoh", "axis-exact", "adjoint", "annealed", "evolved")
-        and (name in LATER) == later
-    ]
+    names = [name for name in names_of(3, later) if name not in ("axis-exact", "adjoint", "annealed", "evolved")]
     arch = Arch(
         form, str(rng.choice(list(ENDS))), load, str(rng.choice(names)), float(rng.uniform(0.8, 4.0)),
         float(rng.uniform(0.05, 0.1)), int(rng.integers(2, 4)),

@@ -26,6 +26,26 @@ def pulled(*force, name="pull", components="x", supports=CLAMP, others=()):
     return st.LoadCase(name, supports, [st.Traction("right", force)], quantities=[*ends, *others])
 
 
+def outline(*sides):
+    """Sides of a shape by their corners and groups; those of arcs with their centres."""
+    return [st.Segment(corner, *(centre or [None]), group) for corner, group, *centre in sides]
+
+
+def asked(**told):
+    """Quantities by their names: kind, place and component."""
+    return tuple(st.Quantity(name, *words.split()) for name, words in told.items())
+
+
+class CountedNetwork(Network):
+    """A network that counts the matrices that it factorizes."""
+
+    taken = 0
+
+    def factorize_matrix(self, *arguments, **options):
+        self.taken += 1
+        return super().factorize_matrix(*arguments, **options)
+
+
 def free_network(mesh, springs):
     """The network of springs on a mesh of which nothing is held."""
     return Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)

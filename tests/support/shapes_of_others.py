@@ -8,6 +8,8 @@ import numpy as np
 
 import springtune as st
 
+from problems import asked, outline
+
 CENTRE = (0.0, 0.0)
 
 
@@ -16,23 +18,15 @@ def holed_plate(size=0.05, radius=0.01):
 
     Kirsch, Z. VDI 42:797 (1898), has the plate without end, whose stress concentration is 3.
     """
-    outline = (
-        st.Segment((radius, 0.0), group="lower"),
-        st.Segment((size, 0.0), group="right"),
-        st.Segment((size, size), group="upper"),
-        st.Segment((0.0, size), group="left"),
-        st.Segment((0.0, radius), CENTRE, group="hole"),
-    )
-    quantities = (
-        st.Quantity("end", "displacement", "right", "x"),
-        st.Quantity("top-of-the-hole", "stress", "top-of-the-hole", "xx"),
-        st.Quantity("area", "area"),
-    )
+    corners = ((size, 0.0), "right"), ((size, size), "upper"), ((0.0, size), "left")
+    sides = outline(((radius, 0.0), "lower"), *corners, ((0.0, radius), "hole", CENTRE))
+    top = {"top-of-the-hole": "stress top-of-the-hole xx"}
+    quantities = asked(end="displacement right x", **top, area="area")
     supports = (st.Support("lower", y=0.0), st.Support("left", x=0.0))
     force = 10e6 * size * 1e-3
     load = st.LoadCase("pull", supports, (st.Traction("right", (force, 0.0)),), quantities=quantities)
     points = {"top-of-the-hole": (0.0, radius), "side-of-the-hole": (radius, 0.0)}
-    return st.Shape("plate-with-a-hole", 1e-3, outline, points=points, loads={"pull": load}), st.Material(210e9, 0.3)
+    return st.Shape("plate-with-a-hole", 1e-3, sides, points=points, loads={"pull": load}), st.Material(210e9, 0.3)
 
 
 def kirsch(points, radius, tension, material):
@@ -109,18 +103,13 @@ def sector(angle, inner, outer, holes=()):
     def at(radius, turn):
         return radius * np.cos(turn), radius * np.sin(turn)
 
-    outline = (
-        st.Segment(at(inner, 0.0), group="end"),
-        st.Segment(at(outer, 0.0), (0.0, 0.0)),
-        st.Segment(at(outer, angle), group="clamp"),
-        st.Segment(at(inner, angle), (0.0, 0.0), "inner"),
-    )
-    asked = tuple(st.Quantity(axis, "displacement", "end", axis) for axis in "xy")
-    load = st.LoadCase(
-        "press", (st.Support("clamp", x=0, y=0),), pressures=(st.Pressure("inner", 1e5),), quantities=asked
-    )
+    round_sides = (at(outer, 0.0), "", CENTRE), (at(inner, angle), "inner", CENTRE)
+    sides = outline((at(inner, 0.0), "end"), round_sides[0], (at(outer, angle), "clamp"), round_sides[1])
+    ends = asked(x="displacement end x", y="displacement end y")
+    clamp, pressure = st.Support("clamp", x=0, y=0), st.Pressure("inner", 1e5)
+    load = st.LoadCase("press", [clamp], pressures=[pressure], quantities=ends)
     rounds = tuple(st.Hole.circle(at(place, turn), radius) for radius, turn, place in holes)
-    return st.Shape("sector", 1e-4, outline, rounds, loads={"press": load})
+    return st.Shape("sector", 1e-4, sides, rounds, loads={"press": load})
 
 
 def random_sector(seed):

@@ -21,7 +21,7 @@ from springtune.linalg.factors import CHOLESKY
 from springtune.mechanics.newton import REFINE_FROM_ERROR
 from springtune.mechanics.series import CURVE_TOLERANCE
 
-from tables import STUDIES
+from tables import STUDIES, cases
 
 REPOSITORY = Path(__file__).parents[2]
 PROGRAM = Path(__file__).with_name("computed.py")
@@ -200,14 +200,7 @@ def test_every_python_agrees_with_the_newest_packages(version, study, usual, tmp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "packages",
-    [
-        pytest.param([one.replace(">=", "==") for one in SNAKEMAKE], id="oldest"),
-        pytest.param(["snakemake==9.16.3", "snakemake-interface-logger-plugins==1.2.4"], id="between"),
-        pytest.param(SNAKEMAKE, id="newest"),
-    ],
-)
+@cases
 def test_the_quick_study_runs_with_this_snakemake(packages, tmp_path):
     """The same scenes are solved, and a run with nothing to do says so, whichever private names it has."""
     python = environment(tmp_path / "venv", sys.executable, [*NEEDED, *packages])

@@ -12,7 +12,7 @@ import pytest
 import springtune as st
 from springtune.studies.output.browse.page import page
 
-from tables import STUDIES
+from tables import STUDIES, beside
 
 HOSTILE = (
     "`click <javascript:alert(1)>`__ <script>alert(1)</script> $x_{$ #panic('x') .. raw:: html *a* |b| \\ {{ 7*7 }} {x}"
@@ -20,11 +20,7 @@ HOSTILE = (
 
 STUDY = STUDIES["hostile_texts"].replace("HOSTILE", json.dumps(HOSTILE))
 
-PRINTED = {
-    "table": 1, "beam": "long", "mesh_type": "structured", "mesh_size_mm": 5, "material": "steel", "load": "traction",
-    "force_N": 1000, "stiffness_N_per_m": 1, "reference_displacement_mm": 1, "displacement_mm": 1,
-    "deformation_error_percent": 1, "remark": HOSTILE,
-}  # fmt: skip
+PRINTED = beside(__file__)["PRINTED"] | {"remark": HOSTILE}
 """A printed cell, with a remark."""
 
 

@@ -140,13 +140,7 @@ class TestSwept:
 def swept(tmp_path_factory):
     """A study that sweeps everything, and the same cells one by one."""
     folder = tmp_path_factory.mktemp("swept")
-    values = {
-        "force": ("100 N", "125 N"),
-        "thickness": ("1 mm", "3 mm"),
-        "young_modulus": ("1 GPa", "2 GPa"),
-        "poisson_ratio": ("0", "0.5"),
-        "stiffness_scale": ("1", "1.25"),
-    }
+    values = beside(__file__)["swept"]
     grid = GRID | {key: list(each) for key, each in values.items()}
     grid |= {"definition": ["lattice", "delingette"], "kinematics": "nonlinear", "sensitivity": "true"}
     text = HEAD.replace("grids:", "outputs: [size, sensitivity, deformed, sweep, tables]\ngrids:")
@@ -228,15 +222,9 @@ def test_figures_show_the_last_values_and_say_which(swept):
 
 def of_grids(folder, name, grids, **keys):
     """Path of a study of one beam, 60x20, of these grids on structured meshes, linear, without curves."""
-    common = {"beam": "60x20", "mesh_type": "structured", "material": "steel", "kinematics": "linear"}
-    common |= {"sensitivity": "false", "mesh_size": "5 mm", "definition": "lattice"}
-    content = {
-        "title": name,
-        "beams": {"60x20": {"length": "60 mm", "height": "20 mm"}},
-        "materials": {"steel": {"young_modulus": "210 GPa", "poisson_ratio": "0.3"}},
-        "outputs": ["tables"],
-        "grids": {str(number): common | grid for number, grid in enumerate(grids)},
-    }
+    told = beside(__file__)["of grids"]
+    content = {"title": name} | told["study"]
+    content["grids"] = {str(number): told["grid"] | grid for number, grid in enumerate(grids)}
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump(content | keys, sort_keys=False))
     return path

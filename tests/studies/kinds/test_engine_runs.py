@@ -70,15 +70,9 @@ def missing(net, setting, damping):
     return module.Toy(net, setting, damping)
 
 
-TOYS = {"toy": Toy, "aborting": Aborting} | {
-    name: moving(name, factor)
-    for name, factor in {
-        "swinging": lambda frames: 1 + frames % 3,
-        "creeping": lambda frames: 1 + frames,
-        "exploding": lambda frames: 1e9,
-        "broken": broken,
-    }.items()
-}
+MOVING = {"swinging": lambda frames: 1 + frames % 3, "creeping": lambda frames: 1 + frames}
+MOVING |= {"exploding": lambda frames: 1e9, "broken": broken}
+TOYS = {"toy": Toy, "aborting": Aborting} | {name: moving(name, factor) for name, factor in MOVING.items()}
 
 
 @pytest.fixture(autouse=True)

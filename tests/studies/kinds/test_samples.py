@@ -77,13 +77,7 @@ def linear(tmp_path_factory, references):
 
 
 class TestDesigns:
-    PARAMETERS = {
-        "length": {"distribution": "uniform", "low": 0.1, "high": 0.4},
-        "height": {"distribution": "triangular", "low": 0.02, "mode": 0.03, "high": 0.08},
-        "thickness": {"distribution": "fixed", "low": 1e-3, "high": 1e-3},
-        "relative_mesh_size": {"distribution": "normal", "low": 0.1, "high": 0.4, "mean": 0.2, "deviation": 0.05},
-        "young_modulus": {"distribution": "log-uniform", "low": 1e6, "high": 1e11},
-    }
+    PARAMETERS = tables.beside(__file__)["PARAMETERS"]
 
     @pytest.mark.parametrize("design", DESIGNS)
     def test_a_task_draws_its_part_of_the_sample(self, design):

@@ -1,6 +1,5 @@
 """The paper: numbers by name, nothing typed, the same bytes from the same datasets; and its own source."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -17,17 +16,11 @@ from springtune.studies.paper.build import draw, run, typed_numbers
 from springtune.studies.paper.numbers import numbers, read, table
 
 import synthetic
+from tables import beside
 
 REPOSITORY = Path(__file__).parents[3]
 PAPER = REPOSITORY / "workflow/paper"
-ATTRIBUTES = {
-    "title": "All kinds",
-    "study": "mine",
-    "springtune_version": "0.1.0",
-    "git_commit": "0123456789abcdef+changes",
-    "created": "2026-01-02T03:04:05+00:00",
-    "software": json.dumps({"numpy": "2.0.0"}),
-}
+ATTRIBUTES = beside(__file__)["ATTRIBUTES"]
 ROWS = yaml.safe_load(Path(__file__).with_name("publication.yaml").read_text())
 CELL, HOLE, CURVE = ROWS["cells"].values()
 
@@ -87,14 +80,10 @@ def test_numbers_are_cells_reductions_and_formulas_of_the_dataset(datasets):
     share = {"over": "best_stiffness", "minus": 1, "reduce": "largest", "unit": "%", "digits": 4}
     ratio = number(datasets, variable="sensitivity/predicted_stiffness", **share)
     assert ratio == f"{100 * (50 / best).max():.4f}"
-    found = numbers(
-        {
-            "a": {"study": "mine", "variable": "mesh_size", "reduce": "largest", "unit": "mm"},
-            "b": {"formula": "sqrt(3) / 2 * a - printed_length", "unit": "mm", "digits": 2},
-        },
-        {"printed_length": {"printed": "12.50", "unit": "mm", "where": "Figure 1"}},
-        datasets,
-    )
+    declared = {"a": {"study": "mine", "variable": "mesh_size", "reduce": "largest", "unit": "mm"}}
+    declared["b"] = {"formula": "sqrt(3) / 2 * a - printed_length", "unit": "mm", "digits": 2}
+    printed = {"printed_length": {"printed": "12.50", "unit": "mm", "where": "Figure 1"}}
+    found = numbers(declared, printed, datasets)
     assert [found[name]["text"] for name in ("printed_length", "a", "b")] == ["12.50", "5", "−8.17"]
     assert found["printed_length"]["source"] == "Figure 1"
 
