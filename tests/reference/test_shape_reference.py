@@ -297,8 +297,8 @@ def test_a_round_inclusion():
     shape = st.Shape("disc", thickness, disc(outer, "rim"), (st.Hole(disc(inner), "core"),), points={"out": (0.6, 0.2)})
     quantities = (st.Quantity("energy", "energy"), st.Quantity("out", "displacement", "out", "x"))
     load = st.LoadCase("grow", (st.Support("rim", 1.0, 1.0),), quantities=quantities)
-    even = {"rim": lambda points, _: strain * points}
-    found = converge(shape, load, {"": around, "core": core}, displacements=even, tolerance=1e-6)
+    drawn = {"rim": lambda points, _: strain * points}
+    found = converge(shape, load, {"": around, "core": core}, displacements=drawn, tolerance=1e-6)
     work = np.pi * outer**2 * strain * thickness * (even * b - odd * c / outer**2)
     assert found.values["energy"] == pytest.approx(work, rel=1e-6)
     r = np.hypot(0.6, 0.2)

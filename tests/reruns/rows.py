@@ -89,11 +89,16 @@ def move_mesh():
     replace(("own.inp", "meshes/mine.inp"))
 
 
+def comment_both():
+    Path("printed.csv").write_text("# As printed.\n" + driver.PRINTED)
+    replace(("title:", "# A comment.\ntitle:"))
+
+
 FUNCTIONS = {
     "nothing": lambda: None,
     "touch_config": partial(os.utime, driver.CONFIG),
     "edit_printed": lambda: Path("printed.csv").write_text(driver.PRINTED.replace("0.011", "0.012")),
-    "comment_printed": lambda: Path("printed.csv").write_text("# As printed.\n" + driver.PRINTED),
+    "comment_both": comment_both,
     "edit_mesh": partial(driver.write_mesh, "own.inp", 3e-4),
     "touch_mesh": partial(os.utime, "own.inp"),
     "move_mesh": move_mesh,

@@ -101,7 +101,7 @@ def test_springtune_run_makes_missing_what_snakemake_cannot_see(changed):
     assert after == set(due)
 
 
-@pytest.mark.parametrize("changed", ["comment added", "printed table commented"], indirect=True)
+@pytest.mark.parametrize("changed", ["study and printed table commented"], indirect=True)
 def test_a_dataset_has_the_files_that_are_there(changed):
     """Comments, too; nothing is computed for them."""
     jobs, solved = driver.Run().finish()
