@@ -105,24 +105,16 @@ def test_a_name_has_an_example_that_can_be_pasted(name):
         known = {node.id for node in nodes if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)}
         known |= {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ExceptHandler)}
         known |= {node.arg for node in nodes if isinstance(node, ast.arg)}
-        known |= {
-            alias.asname or alias.name
-            for node in nodes
-            if isinstance(node, ast.Import | ast.ImportFrom)
-            for alias in node.names
-        }
+        imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+        known |= {alias.asname or alias.name for node in imports for alias in node.names}
         used = {node.id for node in nodes if isinstance(node, ast.Name)}
         assert used <= known | GIVEN | set(dir(builtins)), place
 
 
 def test_type_checkers_know_the_same_names():
     stub = ast.parse(Path(st.__file__).with_suffix(".pyi").read_text())
-    imported = {
-        alias.asname: f"{node.module}.{alias.name}"
-        for node in stub.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    imported = {alias.asname: f"{node.module}.{alias.name}" for node in imports for alias in node.names}
     assert set(imported) | {"__version__"} == set(st.__all__) and len(imported) + 1 == len(st.__all__)
     for name, place in imported.items():
         assert place.rpartition(".")[2] == name

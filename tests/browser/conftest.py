@@ -141,13 +141,11 @@ def odd(tmp_path_factory):
     reference.loc[{"load": "compression"}] *= -1
     applies = xr.ones_like(root.status.isel(dict.fromkeys(("mesh_type", "mesh_size", "definition"), 0), drop=True))
     applies.loc[{"load": "compression", "kinematics": "nonlinear"}] = 0
-    root = root.assign(
-        reference_displacement=reference, reference_applies=applies, deformation_error=-root.deformation_error,
-        residual=xr.full_like(root.deformation_error, -1.2345e-13),
-        paper_displacement=xr.full_like(root.paper_displacement, 8.69e-3),
-        paper_reference_displacement=xr.full_like(root.paper_displacement, 9.5e-3),
-        paper_deformation_error=xr.full_like(root.paper_displacement, 0.0861),
-    )  # fmt: skip
+    values = {"displacement": 8.69e-3, "reference_displacement": 9.5e-3, "deformation_error": 0.0861}
+    printed = {f"paper_{name}": xr.full_like(root.paper_displacement, value) for name, value in values.items()}
+    printed["residual"] = xr.full_like(root.deformation_error, -1.2345e-13)
+    root = root.assign(printed, reference_displacement=reference, reference_applies=applies)
+    root["deformation_error"] = -root.deformation_error
     declared = ROOT.empty(LABELS)
     for name in root:
         root[name].attrs = declared[name].attrs

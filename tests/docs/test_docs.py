@@ -31,12 +31,8 @@ from synthetic import dataset
 from tables import slow_but
 
 REPOSITORY = Path(__file__).parents[2]
-SITE = sorted(
-    page
-    for folder in ("docs", "docs/gallery", "docs/reference")
-    for page in (REPOSITORY / folder).glob("*.md")
-    if "```{" in page.read_text()
-)
+FOLDERS = [REPOSITORY / name for name in ("docs", "docs/gallery", "docs/reference")]
+SITE = sorted(page for folder in FOLDERS for page in folder.glob("*.md") if "```{" in page.read_text())
 """Pages with directives, of the site alone: other pages do not lead to them. What the site generates has none."""
 PLACES = ("*.md", "config/*.md", "docs/*.md", "docs/how-to/*.md", "workflow/profiles/*.md")
 PAGES = sorted(path for pattern in PLACES for path in REPOSITORY.glob(pattern) if path not in SITE)

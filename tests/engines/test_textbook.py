@@ -196,11 +196,8 @@ def one_spring(stiffness=30.0, mass=0.02, force=0.6):
     """A particle on a spring."""
     net = run.net_of(tiny()[0])
     held = np.array([[True, True], [False, True]])
-    parts = {
-        "points": np.array([[0.0, 0.0], [0.1, 0.0]]),
-        "springs": np.array([[0, 1]]),
-        "rest_lengths": np.array([0.1]),
-    }
+    parts = {"points": np.array([[0.0, 0.0], [0.1, 0.0]]), "springs": np.array([[0, 1]])}
+    parts["rest_lengths"] = np.array([0.1])
     loads = {"masses": np.full(2, mass), "held": held, "forces": np.array([[0.0, 0.0], [force, 0.0]])}
     return dataclasses.replace(net, stiffness=np.array([stiffness]), energies=(), **parts, **loads)
 

@@ -157,9 +157,7 @@ def test_a_prescribed_end_moves_a_chain_by_its_closed_form():
     np.testing.assert_array_equal(start, 2.0 * problem.slope)
 
 
-@pytest.mark.parametrize(
-    ("told", "share"), [((1, False), 0.25), ((2, True), 0.25), (None, 0.25), ((0, True), np.nan), ((0, False), np.nan)]
-)
+@cases
 def test_a_path_is_unstable_from_its_first_negative_or_singular_tangent_on(told, share):
     """Flutter on the way is no matter of where the path leads."""
 

@@ -10,7 +10,7 @@ from springtune.prediction.search import FINER_SIZES, asked_error
 from springtune.scene.mesh_cache import MeshCache
 
 from problems import pulled
-from tables import slow_but
+from tables import beside, evaluated, slow_but
 
 BEAM, STEEL = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
 
@@ -124,13 +124,7 @@ class TestRandomSearches:
         assert len(ratios) >= 2 and (ratios <= 1).all()
 
 
-QUESTIONS = {
-    "lattice": (BEAM, 0.3, "2 %", ["traction", "bending"], "structured"),
-    "area": (st.Beam("200 mm", "100 mm"), 0.2, "5 %", ["pressure", "bending"], "structured"),
-    "patch": (st.Beam("123 mm", "15.375 mm"), 0.0, "1 %", ["traction", "pressure"], "right"),
-    "van-gelder": (st.Beam("700 mm", "100 mm"), 0.0, "1 %", ["compression"], "structured"),
-    "free": (st.Beam("300 mm", "100 mm"), 0.0, "2 %", ["traction"], "free"),
-}
+QUESTIONS = evaluated(beside(__file__)["QUESTIONS"], globals())
 """Beam, Poisson's ratio, error, loads and mesh type; by the definition whose answer was broken in between."""
 
 

@@ -13,7 +13,7 @@ from springtune.handover.simulation import simulate
 from engine_scenes import TEN, scene
 from tables import beside
 
-pytest.importorskip("newton")
+newton = pytest.importorskip("newton")
 
 SETTINGS = {"newton-vbd": (1, 10), "newton-xpbd": (0.7, 10)}
 """Step over the largest one of explicit schemes, and iterations, that converge to 1e-3 at the least cost."""
@@ -88,8 +88,6 @@ def test_newton_prints_nothing_and_keeps_its_log_level(capfd):
 def test_typed_numbers_on_ten_scenes(engine, definition, case):
     assert off(engine, definition, case) < LIMITS.get((engine, case), 1e-3)
 
-
-newton = pytest.importorskip("newton")
 
 CASES = beside(__file__)["CASES"]
 

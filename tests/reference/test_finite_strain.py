@@ -279,9 +279,7 @@ def test_the_reaction_is_the_slope_of_the_energy():
     assert slope == pytest.approx(drawn(0.03)["pull"], rel=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("definition", "load"), [("neo-hooke", "pull"), ("neo-hooke", "inflate"), ("delingette", "pull")]
-)
+@cases
 def test_errors_of_networks_vanish_with_the_mesh(definition, load):
     """A sheet with a hole at 30 % strain: with half the edges a quarter of the error is left, and at corners a half."""
     cases = (

@@ -17,6 +17,8 @@ import pytest
 
 import springtune as st
 
+from tables import beside
+
 REPOSITORY = Path(__file__).parents[2]
 NAME = f"springtune-{st.__version__}"
 
@@ -32,11 +34,7 @@ WITHIN = re.compile(
 )
 """All that a wheel may have."""
 
-WORKFLOW = (
-    "Snakefile", "config/paper.yaml", "config/paper_tables.csv", "config/treloar/uniaxial.csv",
-    "config/study.schema.json", "examples/rubber_tests.py", "profiles/default/config.yaml", "workflow/paper/main.typ",
-    "workflow/report/study.rst", "workflow/rules/common.smk",
-)  # fmt: skip
+WORKFLOW = beside(__file__)["WORKFLOW"]
 """What a study needs besides the package."""
 
 

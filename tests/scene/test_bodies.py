@@ -32,9 +32,7 @@ def grouped():
     return st.mesh_shape(PLATE, "6 mm")
 
 
-@pytest.mark.parametrize(
-    ("main", "core"), [(RUBBER, HARD), (RUBBER, STEEL), (STEEL, RUBBER), (STEEL, replace(STEEL, name="same"))]
-)
+@cases
 def test_rubber_beside_other_rubber_is_linear_triangles_of_both(grouped, main, core):
     """Energies of several laws, each of its own cells; stresses too, to rounding at small strain."""
     values = [

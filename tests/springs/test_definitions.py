@@ -18,7 +18,7 @@ from springtune.springs.element_fit import least_squares
 from springtune.springs.lattice import predicted_stiffness
 
 from patches import HEIGHT, SIZE, disturbed, errors, patch
-from tables import beside, evaluated
+from tables import beside, cases, evaluated
 
 RATIOS = (0.3, 1 / 3, 0.49)
 EVERY_RATIO = (0.0, 0.2, 0.25, 0.3, 1 / 3, 0.45, 0.49, 0.5)
@@ -220,9 +220,7 @@ def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
     np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("name", "nu", "ratio"), [("lattice", 0.3, 3**0.5), ("baudet", 0.5, 3.5**0.5), ("axis-exact", 0.25, 2.0)]
-)
+@cases
 def test_sides_without_stiffness_are_not_refused_by_rounding(name, nu, ratio):
     """In whatever unit: before, rounding of the coordinates decided which of these meshes are taken."""
     mesh = st.MESH_TYPES["braced"](0.04, 0.01, 2e-3)

@@ -111,7 +111,7 @@ def dataset(*names):
 @cache
 def _dataset():
     own = (sensitivity, fields, stability, engine_curves, samples, sobol, shapes, shape_fields)
-    groups = {name: partial(made, name) for name in GIVEN if name not in ("labels", "root")}
+    groups = {name: partial(made, name) for name in GIVEN if name not in ("labels", "root", "small")}
     groups |= {one.__name__: one for one in own}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": made("root")} | {f"/{name}": make() for name, make in groups.items()})
@@ -126,18 +126,10 @@ def filled(data, rows):
     return data
 
 
-SMALL_AXES = {
-    "beam": ("200x40", "100x20"), "mesh_type": ("structured", "free"), "mesh_size": (2e-3, 5e-3),
-    "material": ("steel",), "load": ("traction", "bending"), "definition": ("lattice", "patch"),
-    "kinematics": ("linear",), "stiffness_ratio": (0.5, 1.0, 1.5),
-}  # fmt: skip
+SMALL_AXES = GIVEN["small"]["labels"]
 """Labels of a small dataset of scenes and curves."""
 
-HELD = {
-    "displacement", "deformation_error", "field_error", "stiffness", "status", "message", "iterations", "residual",
-    "solve_seconds", "solver", "material_young_modulus", "beam_length", "beam_height", "beam_thickness", "force",
-    "reference_displacement", "best_stiffness", "curve_seconds",
-}  # fmt: skip
+HELD = {*GIVEN["small"]["held"].split()}
 """Variables of the datasets that are compared."""
 
 ATTRIBUTES = {"study": "small", "springtune_version": "0", "config": "title: small\nbeams: 1\n"}

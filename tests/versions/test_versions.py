@@ -21,7 +21,7 @@ from springtune.linalg.factors import CHOLESKY
 from springtune.mechanics.newton import REFINE_FROM_ERROR
 from springtune.mechanics.series import CURVE_TOLERANCE
 
-from tables import STUDIES, cases
+from tables import STUDIES, beside, cases
 
 REPOSITORY = Path(__file__).parents[2]
 PROGRAM = Path(__file__).with_name("computed.py")
@@ -42,13 +42,7 @@ PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.searc
 """Versions of Python that are supported."""
 
 
-PROCESSORS = {
-    "Haswell": {"avx2", "fma"},
-    "SkylakeX": {"avx512f", "avx512dq", "avx512bw", "avx512vl"},
-    "Prescott": {"pni"},
-    "Nehalem": {"sse4_2"},
-    "generic": {"pni"},
-}
+PROCESSORS = beside(__file__)["PROCESSORS"]
 """Kernels of OpenBLAS, and what they ask of a processor; of the generic one numba compiles for no processor either."""
 
 NOISE = ("contrast_error", "contrast_estimate", "buckling_load")
@@ -124,7 +118,7 @@ def processor(name, folder):
     """Environment that makes this processor compute as another one; skips the test if it cannot."""
     if platform.machine() != "x86_64" or not Path("/proc/cpuinfo").exists():
         pytest.skip("OpenBLAS's kernels are chosen by name on x86-64 under Linux alone")
-    lacking = PROCESSORS[name] - set(Path("/proc/cpuinfo").read_text().split())
+    lacking = {*PROCESSORS[name]} - set(Path("/proc/cpuinfo").read_text().split())
     if lacking:
         pytest.skip(f"this processor has no {', '.join(sorted(lacking))}, so kernel {name} is left out")
     if name != "generic":

@@ -42,11 +42,8 @@ def test_the_how_to_is_a_study(here):
         path.rename(here / "treloar" / path.name)
     found = study(text)
     files = {test: here / f"treloar/{test}.csv" for test in ("uniaxial", "equibiaxial", "pure-shear")}
-    assert {one.material for one in found.scenes} == {
-        st.fit_rubber(
-            files["uniaxial"], equibiaxial=files["equibiaxial"], pure_shear=files["pure-shear"], name="treloar"
-        )
-    }
+    others = {"equibiaxial": files["equibiaxial"], "pure_shear": files["pure-shear"]}
+    assert {one.material for one in found.scenes} == {st.fit_rubber(files["uniaxial"], **others, name="treloar")}
     assert {f"treloar/{name}.csv" for name in files} <= set(inputs(found))
 
 

@@ -20,7 +20,7 @@ from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import rerun
 
-from tables import STUDIES, beside
+from tables import STUDIES, beside, cases
 
 AXES = beside(__file__)["AXES"]
 
@@ -225,9 +225,7 @@ class TestHandler(TestLogHandlerBase):
         assert "\nError in rule solve:\n    log: logs/solve.log (check it)\n" in text
         assert text.endswith("what became of it\nComplete log(s)\n")
 
-    @pytest.mark.parametrize(
-        ("setting", "value"), [("dryrun", True), ("verbose", True), ("quiet", {"all"}), ("printshellcmds", True)]
-    )
+    @cases
     def test_runs_that_ask_for_more_or_less_get_snakemakes_lines(self, monkeypatch, setting, value):
         made = io.StringIO()
         emit_run(handler(monkeypatch, made, **{setting: value}))

@@ -19,7 +19,7 @@ from springtune.studies.runs import job, locks, store
 from springtune.studies.runs.source import hash_of
 from springtune.studies.runs.store import DamagedError
 
-from tables import STUDIES
+from tables import STUDIES, cases
 
 RESULTS = {
     "one": {"displacement": 1.25e-3, "message": "µ", "iterations": 3, "field": np.arange(30.0).reshape(10, 3)},
@@ -122,9 +122,7 @@ def test_a_task_whose_process_dies_is_a_hole_and_the_others_are_done(stage, how)
     assert found["a2"]["displacement"] == found["b1"]["displacement"] == 1.0
 
 
-@pytest.mark.parametrize(
-    "error", [ZeroDivisionError("by zero"), np.linalg.LinAlgError("singular"), RuntimeError("no end"), MemoryError()]
-)
+@cases
 def test_a_task_that_fails_for_its_own_reasons_is_a_hole(stage, error):
     acts, run, read, _ = stage
 
