@@ -239,9 +239,8 @@ def test_files_run_at_the_setting_or_are_refused(tmp_path):
     assert found["time_step"] == fit.result.setting.step and found["mass_damping"] == fit.result.damping
     assert found["sweeps"] == 10 and found["displacements"] is None
     for name in ("net.newton.py", "net.xml", "net.mjcf", "net.py"):
-        with pytest.raises(
-            ValueError, match=r"runs .* at a step of its own, .* for xpbd at .*; give .*\.xpbd\.json or"
-        ):
+        says = r"runs .* at a step of its own, .* for xpbd at .*; give .*\.xpbd\.json or"
+        with pytest.raises(ValueError, match=says):
             fit.net().write(tmp_path / name)
 
 

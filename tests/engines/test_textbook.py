@@ -292,9 +292,8 @@ def test_negative_stiffness_is_for_conjugate_gradients_alone(engine):
     if engine == "implicit-cg":
         st.ENGINES[engine].start(pushing, st.Setting(), 0.0).advance(1)
     else:
-        with pytest.raises(
-            st.EngineError, match="'patch': has springs of negative stiffness, .*or engine 'implicit-cg'"
-        ):
+        says = "'patch': has springs of negative stiffness, .*or engine 'implicit-cg'"
+        with pytest.raises(st.EngineError, match=says):
             st.ENGINES[engine].start(pushing, st.Setting(), 0.0)
 
 

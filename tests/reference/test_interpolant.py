@@ -109,9 +109,8 @@ def test_points_outside_are_refused():
 
 def test_what_cannot_be_certified_is_said():
     box = BOXES[AXIAL]
-    with pytest.raises(
-        interpolant.NotCertifiedError, match="'axial' over aspect ratios 1 to 12 .*: more than 20 solves"
-    ):
+    says = "'axial' over aspect ratios 1 to 12 .*: more than 20 solves"
+    with pytest.raises(interpolant.NotCertifiedError, match=says):
         Interpolant.build(AXIAL, *box, most=20)
     with pytest.raises(interpolant.NotCertifiedError, match="the last one, the tolerance is 5.0e-13"):
         Interpolant.build(AXIAL, *box, tolerance=1e-12)

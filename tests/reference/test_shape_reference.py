@@ -95,9 +95,10 @@ def test_what_others_published(name, case):
             assert found.values[quantity.name] == pytest.approx(quantity.expected, rel=allowed)
 
 
-@pytest.mark.parametrize(
-    ("name", "case"), [pytest.param(*one, marks=pytest.mark.slow) if one[0] in LONG_SOLVED else one for one in EVERY]
-)
+FINER = [pytest.param(*one, marks=pytest.mark.slow) if one[0] in LONG_SOLVED else one for one in EVERY]
+
+
+@pytest.mark.parametrize(("name", "case"), FINER)
 def test_a_finer_solution_confirms_the_estimate(name, case):
     shape, material = others.ALL[name]
     load = shape.loads[case]

@@ -168,9 +168,10 @@ def test_an_edit_computes_again_what_it_computes(edited, complete, tmp_path):
     assert driven("due", package, tmp_path / "study") == []
 
 
-@pytest.mark.parametrize(
-    "edited", ["docstring of a stage", "stage of curves", "definition of one scene"], indirect=True
-)
+EDITS = "docstring of a stage", "stage of curves", "definition of one scene"
+
+
+@pytest.mark.parametrize("edited", EDITS, indirect=True)
 def test_an_edit_runs_what_it_concerns(edited, complete):
     package, jobs, _ = edited
     assert set(driven("due", package, complete)) == jobs

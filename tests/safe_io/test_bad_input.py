@@ -201,9 +201,8 @@ class TestCounts:
         assert sound in content
         path.write_bytes(content.replace(sound, other, 1))
         for read in (read_shape, lambda path: read_beam_mesh(path, 0.1, 0.02)):
-            with pytest.raises(
-                st.MeshError, match=r"plate\.\w+: .*is damaged[^\n]*; write it again(, in text, or as .vtu)?$"
-            ):
+            says = r"plate\.\w+: .*is damaged[^\n]*; write it again(, in text, or as .vtu)?$"
+            with pytest.raises(st.MeshError, match=says):
                 read(path)
 
 
@@ -322,9 +321,9 @@ class TestDatasets:
         with pytest.raises(st.MeshError, match="'elsewhere' is a soft link; links and other files are not followed"):
             read_beam_mesh(mesh, 0.1, 0.02)
 
-    @pytest.mark.parametrize(
-        ("spoil", "says"), yaml.safe_load(Path(__file__).with_name("odd_datasets.yaml").read_text())
-    )
+    ODD = yaml.safe_load(Path(__file__).with_name("odd_datasets.yaml").read_text())
+
+    @pytest.mark.parametrize(("spoil", "says"), ODD)
     def test_what_a_dataset_cannot_hold_is_refused_in_one_line(self, path, spoil, says):
         with h5py.File(path, "r+") as file:
             exec(spoil, {"file": file, "h5py": h5py, "np": np})

@@ -11,7 +11,7 @@ from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.plan import mesh_key, stem
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
-from springtune.studies.runs import attempts, job, rerun
+from springtune.studies.runs import attempts, job, keys, rerun
 from springtune.studies.runs.plan import plan
 
 TIMES = re.compile("seconds|created|history|git_")
@@ -127,3 +127,9 @@ class Campaign:
         """Write the tasks of all jobs, as the begin of a run does."""
         for one in self.bundles.values():
             one.write()
+
+
+def forget_keys():
+    """Forget keys; of the same code, versions may be others."""
+    for one in (keys.stage_key, keys.code_key, keys.version_of, keys.distribution):
+        one.cache_clear()

@@ -12,9 +12,8 @@ import xarray as xr
 import springtune as st
 from springtune.studies.kinds.engines import RUN_ENDS
 from springtune.studies.output.comparison import compare
-from springtune.studies.runs import keys
 
-from campaigns import Campaign
+from campaigns import Campaign, forget_keys
 from tables import STUDIES
 
 ABSENT = "no_such_program_of_springtune"
@@ -191,11 +190,6 @@ def test_the_best_factor_gives_the_references_displacement(collected):
 # -- what is computed again --------------------------------------------------------------------------------------------
 
 
-def forget():
-    for one in (keys.stage_key, keys.code_key, keys.version_of, keys.distribution):
-        one.cache_clear()
-
-
 def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(collected, tmp_path, monkeypatch):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "iterations: 5")
     assert ends(collected("toy", "missing", text=text)["engines"]) == {"rest", "absent", "not_requested"}
@@ -210,12 +204,12 @@ def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(colle
             (old / "METADATA").unlink()
             old.rmdir()
         importlib.invalidate_caches()
-        forget()
+        forget_keys()
         assert len(stages_due()) == 1  # and not the one of the other engine
         data = Campaign("try.yaml").collected()["engines"].to_dataset().squeeze()
         assert ends(data) == {"rest", "not_requested"}
         assert data.engine_version.sel(engine="missing").item() == f"{ABSENT} {version}"
-    forget()
+    forget_keys()
 
 
 # -- what is drawn -----------------------------------------------------------------------------------------------------

@@ -13,6 +13,8 @@ from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
+from campaigns import forget_keys
+
 TABLES = yaml.safe_load(Path(__file__).with_name("code_changes.yaml").read_text())
 MODULE = TABLES["module"]
 
@@ -68,14 +70,8 @@ def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
     assert not keys.closure(stage.module).packages & (WRITING | keys.CARRIERS)
 
 
-def forget():
-    """Forget keys; of the same code, versions may be others."""
-    for one in (keys.stage_key, keys.code_key, keys.version_of, keys.distribution):
-        one.cache_clear()
-
-
 def _keys():
-    forget()
+    forget_keys()
     found = {stage.module.removeprefix("studies.kinds."): keys.stage_key(stage.module) for stage in stages()}
     of_beams = ("studies.kinds.bodies.shape_reference", "reference.finite_strain", "reference.interpolant")
     found["unit"] = keys.stage_key("studies.kinds.bodies.reference", without=of_beams)
@@ -112,7 +108,7 @@ def test_a_packages_version_is_in_the_keys_of_what_it_computes(package, known, m
     monkeypatch.setattr(importlib.metadata, "version", lambda name: "999" if name == package else version(name))
     after = _keys()
     monkeypatch.undo()
-    forget()
+    forget_keys()
     assert {name for name in known if after[name] != known[name]} == VERSIONS[package]
 
 
