@@ -137,7 +137,7 @@ class LoadSpace:
         return energies, off, apart, -((2 * stretches @ energies + adjoint) * stretches).sum(axis=1)
 
     def errors(self, stiffness: np.ndarray) -> tuple[float, float, float, float]:
-        """Worst errors [1] over all loads of the space: of energy, displacements, a spring's stretch, and unfitted energy."""
+        """Worst errors [1] over all loads of the space: of energy, displacements, a stretch, and unfitted energy."""
         energies, off, apart = self.misses(stiffness)
         others = self._reduced(polynomial_tests(self.mesh, self.nu, range(5, 7))[0])
         further = others.T @ self._factorized(stiffness)[1].solve(others) - np.eye(others.shape[1])
@@ -182,7 +182,7 @@ class LoadSpace:
 
 
 def delta_of(normals: np.ndarray, wanted: np.ndarray, force: np.ndarray) -> float:
-    """Delta that one particle proves, or 0, by `normals` of springs to it, their `wanted` stretches, and its `force`."""
+    """Delta that one particle proves, or 0, by `normals` of its springs, `wanted` stretches and `force`."""
     from scipy.optimize import minimize, nnls  # here: see `springtune.springs`
 
     rows = np.linalg.svd(np.concatenate([wanted, force]), full_matrices=False)

@@ -82,8 +82,7 @@ def _fit(here: np.ndarray, pairs: tuple[tuple[int, int], ...], matrices: np.ndar
 def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Return the springs k >= 0 of each cell that minimise ``k . products . k - 2 wanted . k``.
 
-    `products` (n_cells, n_springs, n_springs) are of unit springs' effects, `wanted` (n_cells, n_springs) with the
-    wanted.
+    `products` (n_cells, n_springs, n_springs) are of unit springs' effects, `wanted` (n_cells, n_springs) with the aim.
     """
     pairs = wanted.shape[1]
     # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.

@@ -30,7 +30,7 @@ def derive_by_parts(
     thickness: float,
     given: object = None,
 ) -> Springs:
-    """Return the springs of a body with parts of several materials, by a definition of the package or the user's own."""
+    """Return the springs of a body with parts of several materials, by a definition or the user's own function."""
     mesh, labels = grouped.mesh, part_names(grouped)
     groups: dict[AnyMaterial, list[str]] = {}
     for name in ("", *grouped.parts):

@@ -102,9 +102,10 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 
 def outline_tests(mesh: Mesh) -> np.ndarray:
-    """Return forces on the particles of at most `TESTS` tests with polynomial stresses, (n_tests, n_points, 2), E t = 1.
+    """Return forces on the particles of at most `TESTS` tests with polynomial stresses, (n_tests, n_points, 2).
 
-    Times the square root of E t they are in N, with a work of 1 J on their own displacements and 0 on the others'.
+    For E t = 1; times the square root of E t they are in N, with a work of 1 J on their own displacements and 0 on
+    others'.
     """
     return polynomial_tests(mesh)[0]
 
