@@ -144,7 +144,7 @@ def odd(tmp_path_factory):
     values = {"displacement": 8.69e-3, "reference_displacement": 9.5e-3, "deformation_error": 0.0861}
     printed = {f"paper_{name}": xr.full_like(root.paper_displacement, value) for name, value in values.items()}
     printed["residual"] = xr.full_like(root.deformation_error, -1.2345e-13)
-    root = root.assign(printed, reference_displacement=reference, reference_applies=applies)
+    root = root.assign(printed | {"reference_displacement": reference, "reference_applies": applies})
     root["deformation_error"] = -root.deformation_error
     declared = ROOT.empty(LABELS)
     for name in root:
