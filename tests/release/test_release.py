@@ -24,7 +24,7 @@ NAME = f"springtune-{st.__version__}"
 
 WITHIN = re.compile(
     r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|studies/output/page\.html)"
-    r"|springtune/cli/study_of_a_(beam|shape)\.yaml"
+    r"|springtune/(cli/study_of_a_(beam|shape)|studies/kinds/\w+/views)\.yaml"
     r"|springtune/handover/templates/[\w.]+\.jinja"
     r"|springtune/studies/kinds/\w+/\w+\.csv"
     r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
