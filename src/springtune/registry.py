@@ -105,10 +105,9 @@ Function = TypeVar("Function", bound=Declaration)
 
 
 class ExtensibleMapping(Mapping[str, Entry]):
-    """Read-only ordered mapping of the package's entries and of entry points of other packages.
+    """Read-only mapping of the package's entries and of other packages' entry points, without faulty ones.
 
-    `adopt` checks an imported object and returns the entry, or raises ValueError: then it is left out with a
-    `PluginWarning`. `packages` has the distributions of others' entries.
+    `adopt` checks an imported object, and returns the entry or raises ValueError: then a `PluginWarning` says why.
     """
 
     def __init__(

@@ -1,8 +1,7 @@
 """Declaration of engines: what they take, what is typed into them, and how they step.
 
-A frame of `dt` has `substeps` steps of ``h = dt / substeps``, each with `iterations` of the engine's solver. After each
-step velocities are scaled by ``1 / (1 + damping h)``, which does not move an equilibrium. Forces of the load are dead,
-and on from the first step.
+A frame of `dt` has `substeps` steps of ``h = dt / substeps``. After each step velocities are scaled by
+``1 / (1 + damping h)``, which does not move an equilibrium.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,8 +1,7 @@
 """Calibration of a scene to an engine's setting: the numbers to type so that it moves as the material does.
 
 In most solvers the displacement is nearly ``a / s + b`` with a factor ``s`` on all that is typed. ``b`` is what
-iterations and substeps leave, however stiff the springs are: a factor hides it for one load and not for the others, and
-where ``b`` exceeds the material's displacement no factor does.
+iterations and substeps leave: where it exceeds the material's displacement, no factor helps.
 """
 
 import logging

@@ -1,7 +1,6 @@
 """Base of the textbook solvers: a step from the inertial position, and the velocity after it.
 
-A step minimises ``|x - y|^2 / (2 h^2) + W(x)``, the first term weighted by masses, about ``y = x + h v + h^2 f / m``. A
-solver that begins at y and stops early rests too far along the load, as if springs were softer.
+A solver that begins at ``y = x + h v + h^2 f / m`` and stops early rests too far along the load.
 """
 
 import numpy as np

@@ -1,10 +1,4 @@
-r"""A network as plain arrays in SI units: what another program needs to have the same springs.
-
-.. math:: W(x) = \sum_e \tfrac{1}{2} k_e (l_e - L_e)^2 + \sum_{terms} W_{cell}
-
-At equilibrium ``-dW/dx + forces = 0`` in all directions that are not held. With linear kinematics W is the quadratic
-form of its second derivative at rest.
-"""
+"""A network as plain arrays in SI units: what another program needs to have the same springs."""
 
 import inspect
 import sys

@@ -23,10 +23,7 @@ def write_vtu(
     numbers: Mapping[str, float],
     comment: str,
 ) -> None:
-    """Write points [m] and cells with their data atomically; vectors get a third component of zero for ParaView.
-
-    `cells` are particles by number of corners, 2 for lines; `cell_data` is by name and number of corners.
-    """
+    """Write points [m] and cells, by number of corners, with their data; the file appears whole or not at all."""
 
     def flat(values: np.ndarray) -> np.ndarray:
         if values.ndim == 1:

@@ -74,8 +74,7 @@ REST_VALUES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 class Terms:
     """Energies of one kind besides the springs: a row for each of `cells` (n_cells, n_corners), counter-clockwise.
 
-    `values`, by the names of `VALUES`, have shape (n_cells,) or (n_cells, n_corners). Values of sides are of the side
-    opposite to each corner, and `coupling` of the two sides that meet in it.
+    Values of sides are of the side opposite to each corner, and `coupling` of the two sides that meet in it.
     """
 
     kind: str

@@ -13,11 +13,7 @@ ROWS_PER_CHUNK = 5_000
 
 
 class Blocks(NamedTuple):
-    """Symmetric matrix; held directions have zeros.
-
-    `blocks` (n_blocks, 4) are those right of the diagonal, row by row, with `columns` and, from row to row,
-    `pointers`; `diagonal` (n_points, 3) holds xx, xy and yy.
-    """
+    """Symmetric matrix: `blocks` (n_blocks, 4) right of the `diagonal` (n_points, 3: xx, xy, yy), row by row."""
 
     pointers: np.ndarray
     columns: np.ndarray

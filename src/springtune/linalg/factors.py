@@ -1,8 +1,7 @@
 """Factorized symmetric matrices: by CHOLMOD if available, else by SuperLU; orders of elimination.
 
 CHOLMOD comes with the extra package cvxopt. Without it, or with the environment variable ``SPRINGTUNE_SOLVER`` set to
-``superlu``, SuperLU factorizes, which takes three to five times as long. Indefinite matrices have a Cholesky factor
-only with pins (`PinnedFactor`); else SuperLU counts their negative pivots.
+``superlu``, SuperLU factorizes, which takes three to five times as long.
 """
 
 import os

@@ -184,8 +184,7 @@ def _add(sums: Field, weight: float, xx: float, xy: float, yx: float, yy: float)
 def coarsen(matrix: Blocks, grid: Grid, near: np.ndarray, far: np.ndarray, far_blocks: np.ndarray) -> int:
     """Sum Galerkin's matrix on the nodes of a grid, and return how many rows `far` must have.
 
-    `near` (nodes, 13, 4) gets the diagonal, and the blocks of nodes with larger numbers up to two places apart; `far`
-    (n, 2) the numbers of nodes farther apart, which the long springs of a graded mesh join.
+    `near` (nodes, 13, 4) gets blocks of nodes up to two places apart, `far` those that long springs join.
     """
     height, here, there, count = grid.shape[1], np.empty(4), np.empty(4), 0
     for i in range(len(matrix.diagonal)):

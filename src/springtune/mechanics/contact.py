@@ -91,12 +91,7 @@ def neighbours(outline: np.ndarray) -> np.ndarray:
 
 
 class Body:
-    """Network that other bodies touch.
-
-    `reference` is its reference stiffness [N/m]; `forces` (n_points, 2) are dead forces at full load [N], and `force`
-    their total, positive outwards; `prescribed` (n_points, 2) are the displacements of held directions at full load
-    [m].
-    """
+    """Network that other bodies touch; `forces` and `prescribed` displacements [m] are those at full load."""
 
     def __init__(
         self,
@@ -179,11 +174,9 @@ class Obstacle:
 
 
 class _Sides:
-    """Edges and corners of an outline in its current position.
+    """Edges and corners of an outline in its current position, with normals out of the body.
 
-    Of edges: `start`, `along`, `length`, outward `normals`, and `turn`, the sine of the turn at their end, positive at
-    convex corners. Of corners: `meeting` (n_corners, 2, 2), the normals of both edges, `outward`, their mean direction,
-    and `wraps`, where the body is bent around a corner.
+    `turn` is the sine of the turn at the end of an edge, positive at convex corners; the body is bent around `wraps`.
     """
 
     def __init__(self, body: Body | Obstacle) -> None:
@@ -205,12 +198,7 @@ class _Sides:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Corners near edges.
-
-    `owners` and `corners` are each corner's body and particle; `targets` and `edges` (n, 2) each edge's body, -1 for
-    the floor, and particles. `shares` is the corner's place along the edge [1], `normals` point out of the edge's
-    body, and `gaps` [m] are negative behind it.
-    """
+    """Corners near edges: `shares` [1] are their places along the edge, `gaps` [m] are negative behind it."""
 
     owners: np.ndarray
     corners: np.ndarray
@@ -253,10 +241,7 @@ class Contact:
     # -- geometry ------------------------------------------------------------------------------------------------------
 
     def find(self) -> Contacts:
-        """Return the corners near a facing edge of another body, with the nearest edge of each.
-
-        That body's next edges are conditions too where they turn towards the corner.
-        """
+        """Return the corners near a facing edge of another body, with the nearest edge of each and some next ones."""
         none = np.zeros(0, dtype=int)
         parts = [Contacts(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
         sides = [_Sides(body) for body in self.all]
@@ -453,10 +438,7 @@ class Contact:
         return steps, forces
 
     def _solve_closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
-        """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear.
-
-        The tangent needs to be definite only on the motions that closed contacts leave free.
-        """
+        """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear."""
         tangents, missing, rows, gaps, closed = quadratic
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
         stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)

@@ -53,10 +53,7 @@ class Point(NamedTuple):
 def next_point(
     problem: LoadedNetwork, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
 ) -> tuple[Point | None, float]:
-    """Return the next point, or None, and its increment's length [m], halved while Newton's method fails.
-
-    `direction` (unknowns,) [m] points from the point before; None at rest, where the path begins with the sign of `s`.
-    """
+    """Return the next point, or None, and its increment's length [m], halved while Newton's method fails."""
     displacements = problem.moved(last.load, problem.network.expand(last.u))
     try:
         tangent = problem.factorize_tangent(last.load, displacements).solve(problem.rate(displacements))
@@ -111,10 +108,9 @@ class Continuation(NamedTuple):
 def continue_path(
     problem: LoadedNetwork, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
 ) -> Continuation:
-    """Follow a path by arc length from an equilibrium `last` to a load, or to the limit point where it turns back.
+    """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
 
-    `before` is an equilibrium shortly before. `farthest` is the increment behind a limit point, norm of all
-    displacements [m]; 0 stops there. Loads are over the reference stiffness [m].
+    `farthest` is the increment behind a limit point, norm of all displacements [m]; 0 stops there.
     """
     network, limit, lost = problem.network, np.nan, np.nan
     direction = network.reduce(last - before)
@@ -172,11 +168,7 @@ def _limit_load(way: list[float], loads: list[float]) -> float:
 
 @dataclass(frozen=True)
 class Path:
-    """Points of an equilibrium path, in order from rest.
-
-    `loads` (n,) are force over reference stiffness [m], `displacements` (n, n_points, 2) [m]. `negative_pivots` (n,)
-    counts negative eigenvalues of the tangent; `message` says why the path ends early.
-    """
+    """Points of an equilibrium path, in order from rest; `loads` (n,) are over the reference stiffness [m]."""
 
     loads: np.ndarray
     displacements: np.ndarray
@@ -280,8 +272,7 @@ def smallest_share(
 ) -> float:
     """Return where on the line from one tangent (0) to another (1) the first eigenvalue vanishes.
 
-    One over the largest eigenvalue of ``(K1 - K2) v = mu K1 v``. Displacements [m] are None at rest; `mirror` is as far
-    before the first as the second is beyond it [m]: tangents then change as they do at the first.
+    One over the largest eigenvalue of ``(K1 - K2) v = mu K1 v``. Displacements [m] are None at rest.
     """
     here, there = network.tangent(first), network.tangent(second)
     change = here - there if mirror is None else 0.5 * (network.tangent(mirror) - there)

@@ -76,10 +76,8 @@ class Run(Tabled):
 
 
 class Motion(Moving):
-    """Network with masses, dampers and a load.
+    """Network with masses, dampers and a load, over the `reference` stiffness [N/m]; `mass_damping` is alpha [1/s].
 
-    `inertia` (n_points,) [s2], `load` (n_points, 2) [m] and `dampers` (n_springs,) [s] are over the `reference`
-    stiffness [N/m], energies and momenta too where it is left out. `mass_damping` is alpha [1/s];
     ``beta * network.stiffness`` as dampers is Rayleigh damping by stiffness.
     """
 
@@ -136,10 +134,7 @@ class Motion(Moving):
 
     @cached_property
     def loaded_mode(self) -> tuple[float, np.ndarray]:
-        """Frequency [rad/s] and shape (unknowns,) of the mode with the largest share in the static answer to the load.
-
-        By Lanczos' method from the static answer, which keeps to the load's symmetry. The shape has an inertia of 1.
-        """
+        """Frequency [rad/s] and shape (with inertia 1) of the mode with the largest share in the static answer."""
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
             raise ValueError("no load, so no mode is loaded; ask the motion under the load, without released=True")
@@ -206,10 +201,7 @@ class Motion(Moving):
         precision: str = "float64",
         threads: int = 1,
     ) -> Run:
-        """Take a number of steps [s], or step until rest, from displacements [m] and `velocities` [m/s].
-
-        `watch` gets time, displacements and velocities with every sample.
-        """
+        """Take a number of steps [s], or step until rest; `watch` gets time [s], displacements and velocities."""
         name = "backward-euler" if isinstance(integrator, BackwardEuler) else integrator
         if name not in INTEGRATORS:
             raise ValueError(f"unknown integrator '{name}'; known: {', '.join(INTEGRATORS)}")

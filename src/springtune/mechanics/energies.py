@@ -75,10 +75,7 @@ class Energy(ABC):
         return self._forces(self._at_corners(displacements)).transpose(2, 1, 0)
 
     def couplings(self, displacements: np.ndarray | None = None) -> np.ndarray:
-        """Return tangent blocks of pairs of corners of a cell [1], shape (n_pairs, 2, 2, n_cells); at rest by default.
-
-        Axes: pair as `Mesh.cell_edges`, direction at its first corner, at its second. They define the whole tangent.
-        """
+        """Return tangent blocks of pairs of corners [1], (n_pairs, 2, 2, n_cells), as `Mesh.cell_edges` orders them."""
         moved = np.zeros(self._rest.shape) if displacements is None else self._at_corners(displacements)
         return self._couplings(moved)
 

@@ -131,10 +131,7 @@ class Expansion:
         return self._denominators[lower]
 
     def _shares(self, sigma: float, less: int = 0) -> np.ndarray:
-        """Return the factors (order + 1,) of the coefficients in their approximant with one denominator.
-
-        It has half the order, or a degree `less`; the numerator the rest, or all orders within a turn's radius.
-        """
+        """Return the factors (order + 1,) of the coefficients in their approximant with one denominator."""
         lower = self.order // 2 - less
         upper = self.order if self.turning else self.order - lower
         sums = np.zeros(self.order + 1)

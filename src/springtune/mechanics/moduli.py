@@ -62,10 +62,7 @@ def work_of(fields: list[np.ndarray], forces: list[np.ndarray], mesh: Mesh) -> n
 
 
 def strip_fault(mesh: Mesh) -> str:
-    """Return why a mesh is no strip for a patch test between rollers, with the remedy, or an empty string.
-
-    A strip has straight lower and upper faces, one length at every height and no holes; staggered ends are fine.
-    """
+    """Return why a mesh is no strip of one length without holes, with the remedy, or an empty string."""
     outline = mesh.edges[mesh.on_outline]
     x, y = mesh.points.T
     remedy = "give a full rectangle, or rows of one length"
@@ -160,8 +157,7 @@ class PatchTest:
     def stiffness(self, springs: Elastic) -> np.ndarray:
         """Return the plane-stress stiffness (3, 3) under affine displacements of the outline and of holes' rims.
 
-        In Voigt's order, times the thickness over the reference stiffness [1]. Exact on any mesh, the stiffest test
-        (Hill).
+        Times the thickness over the reference stiffness [1]. Exact on any mesh, the stiffest test (Hill's bounds).
         """
         held = self._frame[0]
         network = self._network("frame", held, springs)

@@ -251,10 +251,7 @@ class Network:
     def tangent(
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> csc_array:
-        """Return the derivative of the resistance [1], (unknowns, unknowns), at rest by default.
-
-        It is symmetric except for a follower's part.
-        """
+        """Return the derivative of the resistance [1], (unknowns, unknowns), symmetric except for a follower's part."""
         data = self._pattern.coupling_entries(self._couplings(displacements))
         if follower is not None:
             s, load = follower
@@ -331,10 +328,7 @@ class Network:
         return slack if looked_for else np.zeros_like(slack)
 
     def _mechanism(self, slack: np.ndarray) -> str:
-        """Say where slack springs let a part move without resistance, or return an empty string.
-
-        It is a mechanism if slightly stiffer springs make the network stable and slightly softer ones unstable.
-        """
+        """Say where slack springs let a part move without resistance, or return an empty string."""
         if not slack.any():
             return ""
         little = NO_STIFFNESS * np.abs(self.stiffness).max()

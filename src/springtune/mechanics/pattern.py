@@ -22,8 +22,7 @@ PIN_COUNTS = (8, 32)
 class Pattern:
     """Sparsity of the matrices of all networks with one mesh and one set of held directions: springs define it.
 
-    `number` (n_points, 2) is the unknown of each direction, -1 where held; `indices` and `pointers` (int32) are rows,
-    ascending, and column pointers.
+    `number` (n_points, 2) is the unknown of each direction, -1 where held; rows are ascending.
     """
 
     def __init__(self, mesh: Mesh, held: np.ndarray) -> None:
@@ -180,10 +179,7 @@ class Pattern:
         return (edges + len(self.springs) * turned).T.ravel()
 
     def coupling_entries(self, couplings: np.ndarray) -> np.ndarray:
-        """Return the tangent's entries from blocks (2, 2, n_springs) that couple the ends of each spring.
-
-        A common displacement costs nothing: a particle's own block is minus the sum of its springs' blocks.
-        """
+        """Return the tangent's entries from blocks (2, 2, n_springs) that couple the ends of each spring."""
         own = self._own(couplings)
         return np.concatenate([couplings.ravel(), *own[[0, 1, 1, 2]]])[self._sparsity[2]]
 

@@ -1,8 +1,7 @@
 """Equilibria of a network under a growing load: linear, nonlinear, and along the whole path.
 
-The load is ``s`` times a fixed pattern of forces of total 1, and prescribed displacements ``s`` times theirs;
-``s = F / k`` is force over reference stiffness [m]. So one path serves every force, material and uniform stiffness of a
-mesh. With a pattern in N, ``s = 1 / k``: displacements times k.
+The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is force over reference stiffness [m]. So
+one path serves every force, material and uniform stiffness of a mesh.
 """
 
 from collections.abc import Callable
@@ -56,11 +55,9 @@ START_ORDER = 3
 
 
 class StaticProblem(LoadedNetwork):
-    """Network under a load pattern.
+    """Network under a load `pattern` of forces [1] and `given` displacements, both scaled by ``s``.
 
-    `pattern` (n_points, 2) are forces [1], scaled by ``s``; `dead` is its part that does not follow the deformation.
-    `given` (n_points, 2) are prescribed displacements of held directions over ``s`` [1]. `load` (unknowns,) is the
-    pattern on free directions, and `load_norm` the norm that residuals are over, with the reactions to `given`.
+    `dead` is the part that keeps its direction; `load_norm`, which residuals are over, includes reactions to `given`.
     """
 
     @cached_property
@@ -159,10 +156,7 @@ class StaticProblem(LoadedNetwork):
     def _has_no_snap(
         self, s: float, here: np.ndarray, to: float, there: np.ndarray, guess: np.ndarray, bend: float = 0.25
     ) -> bool:
-        """Return whether the way from one equilibrium to the next is stable in its middle, without a snap.
-
-        The middle is on the parabola through `guess`, extended from `here`, or on the straight way if that is far off.
-        """
+        """Return whether the way from one equilibrium to the next, bent towards a guess, is stable in its middle."""
         network = self.network
         middle, off, way = 0.5 * (here + there), there - guess, there - here
         if bend * np.linalg.norm(off) <= LARGEST_BEND * np.linalg.norm(way):

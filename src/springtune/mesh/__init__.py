@@ -1,8 +1,4 @@
-"""Meshes of beams and shapes: their types, quality, checks, named groups and files.
-
-`rows` and `free` mesh beams, `outlines` shapes, and `formats` reads and writes files. `MESH_TYPES` has all types that
-this package's modules and the user declare with the decorator `mesh_type`.
-"""
+"""Meshes of beams and shapes: their types, quality, checks, named groups and files."""
 
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh

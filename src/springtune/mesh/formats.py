@@ -104,10 +104,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """Read a mesh of any format that meshio reads; `unit` is that of coordinates in the file [m].
-
-    Particles without cells are dropped, clockwise cells are turned. Cells must be linear, plane and not flat.
-    """
+    """Read a mesh of any format that meshio reads, without loose particles; `unit` is the file's [m]."""
     return _build_mesh(path, _file_content(path), unit)[0]
 
 

@@ -33,8 +33,7 @@ def triangulate(
 ) -> Triangulation:
     """Triangulate inside lines, by netgen's advancing front; triangles may be clockwise.
 
-    `lines` are start, end, and the domains on their left and right. Lengths must be about 1: netgen's own tolerances
-    are absolute. `sizes` are those of edges at the points, `region_sizes` those in domains.
+    `lines` are start, end, left and right domain. Lengths must be about 1: netgen's own tolerances are absolute.
     """
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException

@@ -52,11 +52,7 @@ class _Stretch:
 
 
 def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
-    """Mesh a shape by netgen; lengths in m. Same input, same mesh.
-
-    Each side is divided into equal edges no longer than `size`, an arc into at least six a full turn; edges are divided
-    further near much shorter ones. Named points are particles. `refined` has shorter edges at groups.
-    """
+    """Mesh a shape by netgen; lengths in m. Same input, same mesh; see `springtune.mesh_shape`."""
     what = f"shape '{shape.name}'"
     if not shape.rounds:
         raise MeshError(f"{what}: its mesh is that of the file {shape.file}; read it with springtune.read_shape")

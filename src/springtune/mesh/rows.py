@@ -68,10 +68,7 @@ def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
 
 
 def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None = None) -> Mesh:
-    """Exact lattice with staggered ends, on which closed forms hold: every particle inside has the same neighbours.
-
-    `size` is the edge along the rows [m]; `row_height` [m] is by default that of equilateral triangles.
-    """
+    """Exact lattice with staggered ends, on which closed forms hold: every particle inside has the same neighbours."""
     row_height = ROW_HEIGHT * size if row_height is None else row_height
     for name, value in (("cells", cells), ("rows", rows)):
         if not (isinstance(value, Integral) and value >= 1):
@@ -123,7 +120,6 @@ def alternating(length: float, height: float, size: float) -> Mesh:
 
     ::
 
-        +---+---+
         | \ | / |
         +---+---+
         | / | \ |

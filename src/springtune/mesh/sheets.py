@@ -17,8 +17,7 @@ MOST_SEARCHED_ENDS = 2000
 def sheet_fault(mesh: Mesh) -> str:
     """Return why the cells of a mesh are not a conforming plane sheet, with the remedy, or an empty string.
 
-    Cells must be convex and meet in entire edges, at most two in each. Rounds of the outline must not touch themselves
-    or each other: no slits, hanging points, or cells that meet only in a point.
+    Rounds of the outline must not touch themselves or each other: no slits, or cells that meet only in a point.
     """
     fault = convexity_fault(mesh)
     if fault:

@@ -197,10 +197,7 @@ class OutlineSide:
 
 @dataclass(frozen=True)
 class Round:
-    """Closed counter-clockwise round of sides; `around` is the round whose inside is on its right, or None.
-
-    `inner` and `outer` are the parts on its left and right, None outside the body.
-    """
+    """Closed counter-clockwise round of sides, with the parts on its left and right, None outside the body."""
 
     sides: tuple[OutlineSide, ...]
     inner: str | None

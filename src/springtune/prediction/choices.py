@@ -1,8 +1,4 @@
-"""Definitions and stiffnesses to use on a mesh, with their errors, solved in linear kinematics.
-
-All definitions that suit the mesh and the materials are solved and compared with the reference of small strain; the
-best are kept, of all and of springs alone. A patch test between rollers measures the network's moduli.
-"""
+"""Definitions and stiffnesses to use on a mesh, with their errors, solved in linear kinematics."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -400,11 +396,7 @@ def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], a
 
 
 class Trial:
-    """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
-
-    `same` has for each definition with springs the first one with the same springs. `among` replaces the definitions
-    that suit the mesh, `also` adds some.
-    """
+    """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once."""
 
     def __init__(
         self,

@@ -1,8 +1,7 @@
 """Search for the coarsest mesh of each type that keeps an error, by solving.
 
-The error of one load may pass through zero, and whole numbers of cells stretch a mesh now more, now less. So a mesh
-counts if a definition keeps the error on it and on all finer meshes tried, at least two, up to one with twice as many
-cells across the beam, with a margin: the last change over a doubling may happen once more.
+The error of one load may pass through zero by chance. So a mesh counts if the error of all finer meshes tried, up to
+twice as fine, is kept, with a margin: the last change may happen once more.
 """
 
 import logging

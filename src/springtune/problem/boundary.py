@@ -1,7 +1,4 @@
-"""Supports, forces and measured quantities of load cases on a mesh, and their checks.
-
-Held directions and weights have shape (n_points, 2). A beam's groups are the sides of its box.
-"""
+"""Supports, forces and measured quantities of load cases on a mesh, and their checks; arrays are (n_points, 2)."""
 
 from collections.abc import Iterable, Mapping
 

@@ -54,11 +54,7 @@ def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> 
 
 @dataclass(frozen=True)
 class Best:
-    """Stiffness [N/m] at which a sensitivity curve meets the reference, or NaN.
-
-    `status` is solved; unstable if they meet only where the curve is unstable; not converged if they may meet in a gap;
-    failed if they do not meet, or without reference.
-    """
+    """Stiffness [N/m] at which a sensitivity curve meets the reference, or NaN and a `status` that says why."""
 
     stiffness: float
     status: Status
@@ -74,8 +70,7 @@ def best_stiffness(
 ) -> Best:
     """Find the stiffness [N/m] at which the stable part of a sensitivity curve meets the reference.
 
-    ``solve(k) = reference`` is solved for ``1/k``, in which the curve is nearly straight; `solve` returns the stable
-    displacement [m], or NaN. Stable points beyond the last one are sought by bisection.
+    It is solved for ``1/k``, in which the curve is nearly straight; `solve` returns a stable displacement [m], or NaN.
     """
     if not np.isfinite(reference):
         return Best(np.nan, Status.FAILED, "the reference has no displacement")
@@ -144,7 +139,7 @@ def _last_root(
 def assured(errors: np.ndarray) -> np.ndarray:
     """Largest error of each mesh size and all finer ones that were run: a chance crossing of zero promises nothing.
 
-    Arrays are (n_approaches, n_sizes), finest size first. NaN at the finest size, and from where a finer one failed.
+    Arrays are (n_approaches, n_sizes), finest size first, where it is NaN.
     """
     errors = np.abs(errors)
     found = np.full(errors.shape, np.nan)

@@ -65,10 +65,9 @@ BOTH = (0, 1)
 
 @dataclass(frozen=True)
 class LoadKind:
-    """Supports, loaded side and direction of the force.
+    """Supports, loaded side and direction of the force; `pressed` measures the side's middle instead of its mean.
 
-    `held` has sides and their held axes: ``(0, 1)`` is a clamp, ``(1,)`` rollers on a horizontal side. `pressed`
-    measures the middle of the loaded side instead of its mean.
+    `held` has sides and their held axes: ``(0, 1)`` is a clamp, ``(1,)`` rollers on a horizontal side.
     """
 
     name: str
@@ -151,10 +150,7 @@ FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, BOTH),), pressed=True
 
 @dataclass(frozen=True)
 class Load:
-    """Load of a `kind`; `sign` is 1 where the force acts along its axis, -1 against it.
-
-    A `follower` force turns and grows with its side in nonlinear kinematics; its kind must be `LoadKind.direct`.
-    """
+    """Load of a `kind`; `sign` is -1 against its axis, and a `follower` turns and grows with its side if nonlinear."""
 
     kind: LoadKind
     sign: float

@@ -48,10 +48,7 @@ def solve(
     held: np.ndarray,
     finite: bool = False,
 ) -> np.ndarray:
-    """Return displacements [m] at small strain, or neo-Hookean ones at finite strain.
-
-    `elements` (n_elements, 3 or 8) are in plane stress, or in plane strain if the material is.
-    """
+    """Return displacements [m] at small strain, or neo-Hookean ones at finite strain, of 3- or 8-noded elements."""
 
     def lines(rows: Iterable[Iterable[object]]) -> str:
         return "\n".join(", ".join(map(str, row)) for row in rows)

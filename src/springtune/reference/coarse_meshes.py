@@ -395,10 +395,7 @@ def corners_of(
     held: Callable[[Side], bool],
     mirror: Callable[[Side, np.ndarray], bool],
 ) -> dict[int, Corner]:
-    """Return the corners where a solution may not be smooth.
-
-    Between free sides those of more than half a turn (Williams 1952); a symmetry side doubles the angle.
-    """
+    """Return the corners where a solution may not be smooth, as re-entrant ones between free sides (Williams 1952)."""
     at_sides = mesh.part_sides()
     at_corner: dict[int, list[_Ends]] = {}
     for ends in at_sides:

@@ -34,10 +34,7 @@ def solve_finite_shape(
     grouped: GroupedMesh | None = None,
     law: str = "rubber",
 ) -> ShapeReference:
-    """Solve for the displacements of a shape at finite strain, as `solve_shape`.
-
-    `law` is ``"rubber"`` or, always for anisotropic materials, ``"st-venant"`` (St. Venant and Kirchhoff).
-    """
+    """Solve a shape at finite strain by a `law`, ``"rubber"`` or ``"st-venant"``; otherwise as `solve_shape`."""
     return solve_shape(shape, load, materials, grouped, TOLERANCE, _Levels(materials, law == "rubber"))
 
 

@@ -1,8 +1,4 @@
-"""Reference for a shape: linear elasticity at small strain, plane stress, by finite elements on the shape itself.
-
-From level to level the polynomial degree rises, and the number of layers that shrink towards possibly singular corners:
-the error falls exponentially (hp version).
-"""
+"""Reference for a shape: linear elasticity at small strain, plane stress, by hp finite elements on the shape itself."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -457,11 +453,7 @@ VOIGT = np.array([[0, 2], [2, 1]])
 
 
 class Level:
-    """A shape solved on one level; triangles at corners have at most `kept_degree`, if it is not zero.
-
-    What their functions of higher degree would change is estimated as twice the larger one of the last two steps of
-    whole levels, and `note` says so.
-    """
+    """A shape solved on one level; triangles at corners have at most `kept_degree`, if it is not zero."""
 
     most_layers = HIGHEST_DEGREE
     kept_degree = 0

@@ -142,10 +142,7 @@ def virtual_memory() -> int:
 
 @contextmanager
 def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
-    """Context that limits additional memory [bytes] and processor time [s], as damaged files state any number.
-
-    Memory is limited for all threads, time only in the main thread; without support by the system nothing is.
-    """
+    """Context that limits additional memory [bytes] and processor time [s], this in the main thread alone."""
     with _memory_lock, _time_limit(seconds):
         used = virtual_memory()
         if not used:

@@ -45,10 +45,7 @@ A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
 
 
 class BoundaryProblem(ABC):
-    """A body under a load: what is held and loaded, what is read, and the reference.
-
-    `force` is the factor of `loading`: a beam's force with its sign [N], or 1. `size` is the force or a case's scale.
-    """
+    """A body under a load; `force` is the factor of `loading`, and `size` the force [N] or a case's scale."""
 
     body: str
     label: str

@@ -43,7 +43,7 @@ MOST_DISTANCE_FROM_BODY = 1e-3
 class Block:
     """Numbers of one kind from one file: `values` (n,) are `factors` times what `rows` read of the displacements.
 
-    What `shifts` (n, n_shifts), an orthonormal basis, explain tells nothing of the material. `places`: loads or points.
+    What the columns of `shifts`, such as a rigid motion, explain of them tells nothing of the material.
     """
 
     label: str

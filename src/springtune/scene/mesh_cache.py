@@ -73,11 +73,7 @@ def naming_errors(definition: Definition) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """Supports and forces of a load of factor 1 on a mesh; arrays have shape (n_points, 2).
-
-    `held` directions are fixed or moved by `given` [m]. Of the forces `pattern` [N] `dead` keep their direction (None:
-    all or none do), and `follower` turns with its sides.
-    """
+    """Supports and forces of a load of factor 1 on a mesh, (n_points, 2); `dead` forces keep their direction."""
 
     key: tuple[object, ...]
     held: np.ndarray
@@ -95,10 +91,7 @@ def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
 
 @dataclass(frozen=True)
 class Solution:
-    """An equilibrium of a network, judged: NaN without one.
-
-    `load` is the loading's factor over the reference stiffness, `displacement` the load's [m] or the first quantity.
-    """
+    """An equilibrium of a network, judged, NaN without one; `load` is over the reference stiffness."""
 
     problem: StaticProblem
     load: float
@@ -122,8 +115,7 @@ def solve_and_judge(
 class MeshCache:
     """Cache of a meshed sheet of a thickness [m], on which scenes are solved.
 
-    Networks that differ in their reference stiffness alone are assembled and factorized once, the last `networks` are
-    kept, and so are the springs derived last. `filled` are beams that the mesh is known to fill.
+    Networks that differ in their reference stiffness alone are assembled and factorized once.
     """
 
     def __init__(
@@ -153,8 +145,7 @@ class MeshCache:
     ) -> tuple[Springs, float]:
         """Derive the springs of a definition; return them and the seconds that this took.
 
-        `case`, for definitions that are fitted to cases, is the load, its factor and the wanted displacements for a
-        factor of 1, or None without; by default even tension and shear.
+        `case`, for fitted definitions, is a load, its factor, and wanted displacements; by default tension and shear.
         """
         definition = definition_of(definition)
         by_part = material if isinstance(material, Mapping) else {"": material}

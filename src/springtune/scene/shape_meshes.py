@@ -1,7 +1,4 @@
-"""Meshes of shapes: made, or from a file.
-
-Apart from those of beams, whose results do not depend on what meshes outlines.
-"""
+"""Meshes of shapes: made, or from a file. Results of beams do not depend on this module."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -33,10 +33,7 @@ Compute it again with the packages of `versions.json`:
 
 
 def pack(study: Study, folder: Path, target: Path) -> list[str]:
-    """Write a zip archive of a finished study, and return the names of its files.
-
-    Raises ValueError if the dataset is missing, or of another text of the study.
-    """
+    """Write a zip archive of a finished study, and return its files' names; ValueError if the dataset is outdated."""
     from rocrate.rocrate import ROCrate  # here: an extra
 
     with reading.open(folder) as tree:

@@ -41,10 +41,7 @@ Labels = dict[str, str | float]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Tolerances, either is enough; `relative` refers to the larger number, or the largest of a curve or field.
-
-    `absolute` is in the numbers' unit; None is 0, or `relative` for numbers without unit.
-    """
+    """Tolerances, either is enough; `relative` is of the larger number, and serves as `absolute` without a unit."""
 
     relative: float = RELATIVE_TOLERANCE
     absolute: float | None = None

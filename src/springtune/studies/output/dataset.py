@@ -89,10 +89,7 @@ class Group:
         rows: Iterable[Mapping[str, object]] | pd.DataFrame,
         names: Collection[str] | None = None,
     ) -> xr.Dataset:
-        """Create the dataset of rows of labels and values; each value goes to the labels that its variable has.
-
-        An array fills the first places along dimensions without labels; ones without an axis take the rows' order.
-        """
+        """Create the dataset of rows of labels and values; each value goes to the labels that its variable has."""
         frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
         needed = {one for dimensions, *_ in self.variables.values() for one in dimensions} - axes.keys()
         own = {one: frame[one].dropna().unique().tolist() if one in frame else [] for one in needed}

@@ -154,10 +154,7 @@ def small_multiples(
     said: str = "",
     key: Sequence[Artist] = (),
 ) -> np.ndarray:
-    """Draw a panel of some `height` [inch] for each title; return the panels, shape (n_panels,).
-
-    `draw` gets a panel and its part; it returns notes, and the reason if it drew no line, see `add_legend`.
-    """
+    """Draw a panel of some `height` [inch] for each title; `draw` returns notes, and the reason if it drew no line."""
     given = ax is not None and not isinstance(ax, Figure | SubFigure)
     wide = style.COLUMN_WIDTH if len(shown) == 1 < columns else style.PAGE_WIDTH
     columns = len(shown) if given else min(columns, len(shown))

@@ -1,7 +1,4 @@
-"""A job of a stage, ``python -m springtune.studies.runs.job TASKS RECORD DIGEST STUDY``.
-
-The begin of a run writes the note ``TASKS``, with the stage's module and tasks; without it the job plans the study.
-"""
+"""A job of a stage, ``python -m springtune.studies.runs.job TASKS RECORD DIGEST STUDY``."""
 
 import os
 import sys

@@ -1,7 +1,4 @@
-"""Locks of running studies, and the study that a folder of results belongs to.
-
-Snakemake's locks stay after a kill. A run also locks a note in each study's folder by `flock`, which ends with it.
-"""
+"""Locks of running studies by `flock`, which end with the process, and the study of a folder of results."""
 
 import fcntl
 import filecmp

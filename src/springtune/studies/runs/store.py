@@ -1,8 +1,7 @@
 """Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
 Scalars and texts are one JSON text, since HDF5 attributes cost more than solving. Arrays that are written together and
-have one shape are rows of a dataset; the JSON text has their places. Structures have checksums by the file format
-``latest``, data by the filter Fletcher-32, and a file has its name in it: damaged and exchanged files are found.
+have one shape are rows of a dataset. Checksums and a file's name in it show damaged and exchanged files.
 """
 
 import io

@@ -1,7 +1,4 @@
-"""Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``.
-
-The part of this kind in a study has its shapes alone, or None; beams are attributes of the study.
-"""
+"""Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``."""
 
 from collections import Counter
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""Reading and writing of stored meshes, references and scenes.
-
-A mesh is a VTU file, unless it cannot be made, and a stored result with the file's checksum, its quality and groups.
-"""
+"""Reading and writing of stored meshes (VTU files with a stored result beside), references and scenes."""
 
 import hashlib
 from pathlib import Path

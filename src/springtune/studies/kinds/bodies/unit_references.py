@@ -1,7 +1,4 @@
-"""References in small strain: unit problems, and interpolants that answer for many of them.
-
-An interpolant that meets no tolerance has the reason and, solved one by one, the unit problems asked of it.
-"""
+"""References in small strain: unit problems, and interpolants that answer for many of them."""
 
 import time
 from functools import partial

@@ -71,11 +71,7 @@ def _strip_result(task, size):
 
 def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,
         rigid=RIGID_MODULUS_RATIO):  # fmt: skip
-    """Lay a strip on a trapezoid [m, Pa], which is rigid from a ratio `rigid` of Young's moduli on.
-
-    Returns results by their names in the dataset: `penetration` over the mesh size, `contact_force_error` over the load
-    (NaN for drawn ends), `outline` of shape (n, 2) [m].
-    """
+    """Lay a strip on a trapezoid [m, Pa], rigid from a ratio of moduli on; return results by dataset names."""
     begin = time.perf_counter()
     body, mesh = _strip_body(strip, trapezoid, material, definition, size, loading, pressure)
     skipped = ["unknowns of the floor"]

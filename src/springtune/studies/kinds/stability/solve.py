@@ -1,7 +1,4 @@
-"""Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset.
-
-An experiment takes a `Setup` and yields labels of `AXES` and mesh sizes, and results by variable.
-"""
+"""Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset."""
 
 import time
 from contextlib import contextmanager

@@ -1,7 +1,6 @@
 """The page: a dataset, the views of the study kinds, and BokehJS from its installed package, in one file.
 
-Numbers are packed as float32 without the digits that the page never shows, long arrays only with rows of values, as
-differences from point to point, and bytes sorted by their place in a number. `assets/data.js` reads it.
+Numbers are packed as float32, rounded to the shown digits, as differences and by bytes; `assets/data.js` reads it.
 """
 
 import base64
