@@ -1,7 +1,7 @@
 """Declaration of engines: what they take, what is typed into them, and how they step.
 
 A frame of `dt` has `substeps` steps of ``h = dt / substeps``. After each step velocities are scaled by
-``1 / (1 + damping h)``, which does not move an equilibrium.
+``1 / (1 + damping h)``, which does not move an equilibrium. Forces of the load are dead, and on from the first step.
 """
 
 from collections.abc import Callable, Mapping
@@ -327,7 +327,6 @@ def engine(name: str, *, order: float = 1000, **declared: Any) -> Callable[[Func
     Returns
     -------
     callable
-        Decorator of a function (net, setting, damping) -> `Session`.
 
     Examples
     --------

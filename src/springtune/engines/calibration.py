@@ -335,10 +335,8 @@ def fit_engine(
 
     Raises
     ------
-    KeyError
-        If no engine has the name.
-    EngineError
-        If the engine is not installed or lacks what the scene has, or the load has no displacement.
+    KeyError, EngineError
+        As of `in_engine`, or if the load has no displacement.
 
     Examples
     --------

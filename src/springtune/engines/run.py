@@ -262,10 +262,8 @@ def in_engine(
 
     Raises
     ------
-    KeyError
-        If no engine has the name.
-    EngineError
-        If the engine is not installed, or lacks what the scene has.
+    KeyError, EngineError
+        If no engine has the name; if it is not installed, or lacks what the scene has.
 
     Examples
     --------

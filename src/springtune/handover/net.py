@@ -1,4 +1,8 @@
-"""A network as plain arrays in SI units: what another program needs to have the same springs."""
+"""A network as plain arrays in SI units: what another program needs to have the same springs.
+
+Its energy W is the sum of ``k (l - L)^2 / 2`` over springs and of the `Terms` of cells; ``-dW/dx + forces = 0`` at
+rest.
+"""
 
 import inspect
 import sys
@@ -257,8 +261,7 @@ class SpringNet(Tabled, Net):
         Raises
         ------
         ValueError
-            If the name has another ending, its folder is not there, or the load prescribes displacements, which no
-            such file tells.
+            If the name has another ending, its folder is not there, or the load prescribes displacements.
         """
         load = self.header.get("load")
         if load and load.get("prescribed"):

@@ -70,11 +70,7 @@ class Simulation:
 def simulate(
     net: Net, program: str, laws: Iterable[str] = (), energies: Callable[[Net, float], list[Energy]] | None = None
 ) -> Simulation:
-    """Masses, damping, step and equilibrium of a net for a simulator, whose own `energies` may stand for the net's.
-
-    A mode of frequency w under a damping over mass c > 2 w comes to rest with the rate c/2 - sqrt(c^2/4 - w^2), which
-    is the lowest frequency w1 for c = w1 + w^2/w1.
-    """
+    """Masses, damping, step and equilibrium of a net for a simulator, whose own `energies` may stand for the net's."""
     _check(net, program, laws)
     assert net.masses is not None
     reference = float(net.header["reference_stiffness"])

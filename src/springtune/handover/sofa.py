@@ -1,8 +1,8 @@
 """Scenes for SOFA in Python, for SofaPython3.
 
-Written after the sources of SOFA v24.06 to v26.06, not run there: SOFA has no wheel. `SpringForceField` gives each
-spring its own stiffness [N/m] and rest length. `MeshSpringForceField` will not do: it has one stiffness for all edges,
-divides it by their lengths, and since v24.12 passes over springs that it is given (sofa issue 5135).
+Written after the sources of SOFA v24.06 to v26.06, not run there: SOFA has no wheel. `MeshSpringForceField` will not
+do: it has one stiffness for all edges, divides it by their lengths, and since v24.12 passes over springs that it is
+given (sofa issue 5135).
 """
 
 import numpy as np

@@ -1,10 +1,8 @@
 """Networks in motion: masses, dampers and time steps.
 
-With loads and stiffnesses over a reference stiffness k a network moves as ``(m/k) u'' + (c/k) u' + r(u) = s p``. Masses
-enter as inertia m/k [s2] and dampers as c/k [s]; frequencies and steps stay in seconds.
-
-A run can rest on an unstable equilibrium, such as a straight column above its buckling load: the tangent at rest is
-factorized once, to count its negative pivots.
+With loads and stiffnesses over a reference stiffness k a network moves as ``(m/k) u'' + (c/k) u' + r(u) = s p``, with
+inertia m/k [s2] and dampers c/k [s]; frequencies and steps stay in seconds. A run can rest on an unstable equilibrium,
+so the tangent at rest is factorized once, to count its negative pivots.
 """
 
 from collections.abc import Callable, Iterator

@@ -200,10 +200,7 @@ def advance_matrix(
     depth: int,
     progress: np.ndarray,
 ) -> None:
-    """Advance a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
-
-    `u` (2, unknowns) and `v` (1, with dampers 2, unknowns) alternate between two states; `dampers` may be empty.
-    """
+    """Advance a linear network in the passes of a thread; `u` and, with dampers, `v` alternate between two states."""
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
     blocks, distance = _passes(count, size, depth, bandwidth)
     for number in range(thread, (steps + depth - 1) // depth, threads):

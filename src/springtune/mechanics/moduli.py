@@ -215,10 +215,7 @@ def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
 
 
 def isotropic_moduli(compliance: np.ndarray) -> tuple[float, float]:
-    """Return Young's modulus and Poisson's ratio [1] of a compliance (3, 3, Voigt), as means over all directions.
-
-    1/E is the mean strain along a unit pull, nu/E the mean shortening across it.
-    """
+    """Return E and nu [1] of a compliance (3, 3): means over all directions of strains along and across a unit pull."""
     (xx, xy, _), (_, yy, _), (_, _, shear) = compliance
     along, across = (3 * (xx + yy) + 2 * xy + shear) / 8, (xx + yy + 6 * xy - shear) / 8
     return 1 / along, -across / along

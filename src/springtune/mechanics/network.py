@@ -55,10 +55,7 @@ SMALL_PIVOT = 1e-8
 
 
 class FollowerPressure:
-    """Pressure that turns and grows with its edges (n, 2), which have the body to their left.
-
-    Half of ``e`` turned left by a right angle, times `pressure`, one or (n,) [1/m], acts on either end.
-    """
+    """Pressure [1/m] that turns and grows with its edges (n, 2), which have the body to their left."""
 
     def __init__(self, mesh: Mesh, edges: np.ndarray, pressure: float | np.ndarray) -> None:
         self.edges = edges
@@ -92,29 +89,10 @@ class FollowerPressure:
 
 
 class Network:
-    """Particles joined by springs, with some directions held.
+    """Particles joined by springs, with some directions held (n_points, 2).
 
-    `held` (n_points, 2) is True where a particle cannot move in x or y; `stiffness` (n_springs,) is over the
-    reference stiffness [1]. Springs run from particle `first` to `second`, with `rest_vectors` (n_springs, 2) and
-    `rest_lengths` [m].
-
-    Examples
-    --------
-    A square of two triangles, its left side clamped; a stiffness of 1 on every spring:
-
-    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
-    >>> held = np.array([[True, True], [False, False], [False, False], [True, True]])
-    >>> network = Network(mesh, held, np.ones(len(mesh.edges)))
-    >>> network.unknowns, len(network.stiffness)
-    (4, 5)
-
-    Linear displacements of its corners under a unit load to the right on each of the free ones:
-
-    >>> network.expand(network.rest_factor.solve(np.array([1.0, 0.0, 1.0, 0.0]))).round(3)
-    array([[ 0.,  0.],
-           [ 1., -1.],
-           [ 1., -1.],
-           [ 0.,  0.]])
+    Springs run from particle `first` to `second`, with `rest_vectors` (n_springs, 2) and `rest_lengths` [m];
+    `stiffness` (n_springs,) is over the reference stiffness [1].
     """
 
     def __init__(
@@ -291,10 +269,7 @@ class Network:
 
     @cached_property
     def local_stiffness(self) -> np.ndarray:
-        """Return the sums of stiffness about each particle over the reference stiffness, shape (n_points, 2).
-
-        The largest, over its mass, bounds the eigenvalues of stiffness over mass (Gershgorin's theorem).
-        """
+        """Return sums of stiffness about particles (n_points, 2); over mass they bound eigenvalues (Gershgorin)."""
         if self.energies:
             return self.expand(np.asarray(abs(self.tangent()).sum(axis=1)).ravel())
         count, size = len(self.held), np.abs(self.stiffness)

@@ -46,10 +46,7 @@ PATH_DISTANCE = 0.02
 
 
 def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weighted displacement at many loads on one path from rest, or NaN, and where it is stable up to there.
-
-    `weights` (n_points, 2); `targets` (n,) are forces over reference stiffness, all of one sign [m].
-    """
+    """Return the weighted displacement at loads of one sign [m] on the path from rest, and where it is stable."""
     path = StablePath(problem, weights, targets)
     return path.values, path.stable
 

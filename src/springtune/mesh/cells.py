@@ -56,8 +56,7 @@ class Mesh:
     Raises
     ------
     MeshError
-        If an array has the wrong shape, a coordinate is not finite, a cell is clockwise, flat or has a missing point,
-        or there are no cells.
+        If an array has the wrong shape, a coordinate is not finite, or a cell is clockwise, flat or lacks a point.
 
     Examples
     --------

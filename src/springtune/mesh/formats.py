@@ -303,9 +303,8 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
 def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
     """Read a mesh with its groups, of any format that meshio reads; `unit` is that of coordinates in the file [m].
 
-    Groups are physical groups of Gmsh (by number if unnamed), sets of Abaqus, groups of MED, and named arrays of zeros
-    and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline, make sides; one point
-    makes a point; triangles and quadrilaterals make a part, unless they are all cells.
+    Lines, and points joined by the outline, make sides; one point makes a point; triangles and quadrilaterals make a
+    part, unless they are all cells. In VTU groups are named arrays of zeros and ones; cell data ``part`` numbers parts.
     """
     content = _file_content(path)
     mesh, used = _build_mesh(path, content, unit)

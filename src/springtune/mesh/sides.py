@@ -24,10 +24,7 @@ CHORD_ERROR = 1e-6
 
 @dataclass(frozen=True)
 class OutlineSide:
-    """Side of an outline: straight, or an arc of less than half a turn; ends in m.
-
-    Parameters run from 0 to 1, by angle along an arc (the eccentric angle of an ellipse). The body is on the left.
-    """
+    """Side of an outline: straight, or an arc of less than half a turn, with the body on its left; ends in m."""
 
     start: Point
     end: Point

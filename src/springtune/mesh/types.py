@@ -111,7 +111,6 @@ def mesh_type(
     Returns
     -------
     callable
-        Decorator.
 
     Raises
     ------

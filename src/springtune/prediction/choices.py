@@ -246,8 +246,8 @@ def predict(
     -------
     list of Choice
         The best four of all definitions, and the best four of springs alone, the same springs once. Errors that differ
-        by less than the reference's error estimate are equal: springs alone come first, then names. On a shape errors
-        are by quantity of interest, and moduli are NaN: a patch test between rollers needs a strip.
+        by less than the reference's error estimate are equal: springs alone come first, then names. On a shape moduli
+        are NaN.
 
     Raises
     ------

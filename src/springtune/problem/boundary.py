@@ -152,10 +152,7 @@ def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray
 
 
 def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -> np.ndarray:
-    """Return the weights of the support forces that make a reaction.
-
-    A particle held by two groups divides its force by their lengths; a point on such sides has no force of its own.
-    """
+    """Return the weights of support forces that make a reaction; groups share a particle's force by their lengths."""
     axis = "xy".index(quantity.component)
     holding = [one for one in case.supports if (one.x, one.y)[axis] is not None]
     shares = {group: _lengths(grouped, group) for group in dict.fromkeys(one.group for one in holding)}

@@ -68,10 +68,7 @@ def best_stiffness(
     reference: float,
     solve: Callable[[float], float],
 ) -> Best:
-    """Find the stiffness [N/m] at which the stable part of a sensitivity curve meets the reference.
-
-    It is solved for ``1/k``, in which the curve is nearly straight; `solve` returns a stable displacement [m], or NaN.
-    """
+    """Find the stiffness [N/m] at which the stable part of a curve meets the reference, by ``solve(k)`` in 1/k."""
     if not np.isfinite(reference):
         return Best(np.nan, Status.FAILED, "the reference has no displacement")
     softness, error = 1.0 / np.asarray(stiffness)[::-1], np.asarray(displacement)[::-1] - reference
@@ -158,9 +155,6 @@ def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
 
 
 def band(values: Sequence[float]) -> float:
-    """Return the half-width of the band of a value that scatters from mesh to mesh: twice its largest difference.
-
-    Of a few such values the next one often lies beyond their extremes, hence twice. NaN with fewer than two values.
-    """
+    """Return the half-width of the band of a value that scatters from mesh to mesh: twice its largest difference."""
     known = [value for value in values if np.isfinite(value)]
     return 2 * (max(known) - min(known)) if len(known) > 1 else float("nan")

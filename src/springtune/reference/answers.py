@@ -1,7 +1,7 @@
 r"""Post-processing of references: fields, limits of small strain, scales of unit problems.
 
-A cantilever under a dead end load is the elastica :math:`\theta'' = -\alpha \cos\theta`,
-:math:`\alpha = F L^2 / (E I)`. It deflects by :math:`4/35\,\alpha^2` less than in small strain.
+A cantilever's end under a dead load deflects by :math:`4/35\,\alpha^2` less than in small strain, where it turns by
+:math:`\alpha/2`, with :math:`\alpha = F L^2 / (E I)` (elastica).
 
 The unit problem has lengths over half the height and stresses over the traction. Only the aspect ratio, Poisson's ratio
 and the kind of load remain, so beams share it.

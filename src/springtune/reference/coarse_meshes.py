@@ -1,13 +1,6 @@
-r"""Coarse triangles of a shape whose sides lie on its arcs, graded towards its corners.
+"""Coarse triangles of a shape whose sides lie on its arcs, graded towards its corners.
 
-Triangles at a corner are cut at a fifth of their sides, again and again: the layers of `grade`::
-
-        c
-       / \            Each triangle (v, a, b) becomes a similar one (v, a', b') and two beside it. Neighbours share
-      /   \           their cuts, so that the mesh stays conforming.
-     a'----b'
-    /   .    \
-   a ---------- b
+Triangles at a corner are cut at a fifth of their sides, again and again, conforming with their neighbours.
 """
 
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,6 @@
 """Reference for a shape at finite strain: each material by a law of its own, on the levels of `shapes`.
 
-Tractions and gravity keep their direction; pressures that follow turn and grow with their sides. A stress is a force
-over the length that it acts on now and the thickness at rest, as that of a network.
+A stress is a force over the length that it acts on now and the thickness at rest, as that of a network.
 
 Strain is infinite at a clamped corner, and a free side that is pressed there creases in ever smaller places. Where a
 level has no stable equilibrium for this, triangles at such corners keep the degree of the last one that has.

@@ -1,11 +1,8 @@
 r"""Tensor Chebyshev interpolant of a unit problem: thousands of beams for tens of solves.
 
 The unit problem is analytic in :math:`(\log a, \nu)`, with the aspect ratio a. Logarithms of its answers are
-interpolated, nearly straight lines in :math:`\log a`. The Chebyshev coefficients fall geometrically, and with them the
-error (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2).
-
-Intervals are doubled along the axis with the larger expected error, and reuse all solves. Then solves between nodes
-decide: the largest difference, times a factor, enters the error estimate.
+interpolated; coefficients and error fall geometrically (Trefethen, Approximation Theory and Approximation Practice,
+2013, theorem 8.2). Solves between nodes decide: the largest difference, times a factor, enters the error estimate.
 """
 
 from collections.abc import Callable, Mapping

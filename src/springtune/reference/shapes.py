@@ -53,8 +53,7 @@ class ShapeReference:
 
     - `values`: Quantities of interest, in SI units; zero if less than ten times their error bound, as by symmetry.
     - `error_estimates`: Relative error bounds [1]: over the value, or over a thousandth of the body's largest value of
-      its kind if that is larger; such `negligible` quantities have meaningless relative errors.
-    - `energy`: Strain energy [J].
+      its kind; smaller ones are `negligible`.
     - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
     - `note`: Why error estimates are larger than those of other references, or an empty string.
     """

@@ -1,8 +1,4 @@
-"""Measured tests of sheets: forces with displacements, or displacements of points, from CSV files.
-
-A field has the columns x, y, u and v, places at rest and displacements; a curve ``force`` and ``displacement``. Others
-are ignored. Units stand in the heads, as in ``force [N],displacement [mm]``.
-"""
+"""Measured tests of sheets: forces with displacements, or displacements of points, from CSV files."""
 
 import math
 import re

@@ -199,7 +199,6 @@ class Scene(Tabled):
         Parameters
         ----------
         displacements : ndarray of float, shape (n_points, 2)
-            Of the particles [m].
 
         Returns
         -------
@@ -334,8 +333,7 @@ class Scene(Tabled):
         Raises
         ------
         ValueError
-            If the material has no density, or the load prescribes displacements or turns with the sides it acts on.
-            Turning loads can be released.
+            If the material has no density, or the load prescribes displacements, or turns and is not released.
 
         Examples
         --------
@@ -400,9 +398,8 @@ class Scene(Tabled):
         Warns
         -----
         AssumptionWarning
-            If nothing bifurcates: a column on a mesh that is no mirror image, such as ``free``, ``right`` or some
-            ``structured`` ones, bends from the first load on and stays stable. The force is then that of the nearly
-            perfect column.
+            If nothing bifurcates: a column on a mesh that is no mirror image, such as ``free`` or ``right``, bends
+            from the first load on and stays stable. The force is then that of the nearly perfect column.
 
         Examples
         --------

@@ -235,7 +235,6 @@ def definition(
     Returns
     -------
     callable
-        Decorator.
 
     Raises
     ------

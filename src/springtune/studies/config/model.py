@@ -171,12 +171,7 @@ class Study:
         return self.parts["bodies"]["shapes"] if self.parts["bodies"] else None
 
     def material(self, name: str) -> AnyMaterial:
-        """A material that the study declares.
-
-        >>> import springtune as st
-        >>> st.load_study("config/shapes.yaml").material("steel").young_modulus
-        210000000000.0
-        """
+        """A material that the study declares."""
         if name not in self.materials:
             raise ValueError(f"material: '{name}' is unknown; {nearest(name, self.materials)}")
         return self.materials[name]

@@ -141,8 +141,7 @@ def compare(
 ) -> Comparison:
     """Compare two datasets by label; list at most so many changes of each variable.
 
-    Numeric labels match in nine digits; NaN equals NaN. Values of cells that one study does not request are not
-    compared. Numbers inside texts are compared as numbers. `MEASURED_VARIABLES` is left out.
+    Numeric labels match in nine digits, NaN equals NaN, and `MEASURED_VARIABLES` is left out.
     """
     nodes = [{node.path: _rounded(node.to_dataset()) for node in tree.subtree} for tree in (before, after)]
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})

@@ -211,7 +211,6 @@ def info(path: str | os.PathLike[str]) -> Info:
     Returns
     -------
     str
-        How scenes ended, errors by definition, groups, and versions of what made it.
 
     Raises
     ------

@@ -10,8 +10,7 @@ The module of a stage defines ``solve(task)``, which returns a result, and may d
 - ``order(task)`` is the sort key of tasks.
 - ``run(content, attempts)`` replaces the loop over files and tasks.
 
-A failed task is a result with its reason, also if its process dies. A broken program ends the job after all other
-tasks.
+A task fails with its reason, also if its process dies; a broken program ends the job after all other tasks.
 """
 
 import ctypes

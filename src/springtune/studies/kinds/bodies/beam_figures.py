@@ -465,9 +465,8 @@ def plot_sweep(
         A study's dataset, or its root.
     ax : Figure or sequence of Axes, optional
     parameter : str
-        ``"force"``, ``"thickness"``, ``"young_modulus"``, ``"poisson_ratio"`` or ``"stiffness_scale"``. Of the others
-        that are swept each beam shows values under which this one has most; of several the largest force, under it
-        the largest thickness, and so on.
+        ``"force"``, ``"thickness"``, ``"young_modulus"``, ``"poisson_ratio"`` or ``"stiffness_scale"``. Of others
+        that are swept each beam shows values under which this one has most, else the largest.
     beam : str, optional
         One beam in place of all.
     mesh_size : float, optional

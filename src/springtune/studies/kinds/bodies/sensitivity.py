@@ -1,7 +1,6 @@
 """Stage `sensitivity`: displacement against uniform stiffness, and the stiffness that meets the reference.
 
-Loads of a mesh share their network, its factor at rest and the series about it. Each curve follows a path of its own
-from there, since a result may not depend on which others are computed along with it.
+Each curve follows a path of its own: a result may not depend on which others are computed along with it.
 """
 
 import time

@@ -42,8 +42,7 @@ def shapes(tree):
 def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, kinematics=None):
     """Error of each quantity of a shape over particles and over seconds: a line a definition.
 
-    Errors are against the reference, or where there is none, against the expected value. Hollow markers are of networks
-    that are not stable, and of those that deform beyond what the reference is good for.
+    Errors are against the reference, or else the expected value. Hollow markers: unstable, or beyond the reference.
 
     Parameters
     ----------
@@ -268,8 +267,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     Raises
     ------
     ValueError
-        If the dataset has no networks of shapes, the selection leaves a choice, or nothing, or ``ax`` is not as many
-        Axes as definitions.
+        If the dataset has no networks of shapes, the selection leaves a choice, or nothing, or ``ax`` does not fit.
 
     Examples
     --------

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
 class Plot:
     """A plot of a group; readers choose along unnamed dimensions.
 
-    `by` has one line a label, or is a map's y axis. A line joins the points `along` a dimension if `x` is a variable,
-    in the order of `x` if `ascending`. `log` names logarithmic axes ("x", "y", "xy"), which show magnitudes. `beside`
-    lists further lines as (x, variable, name).
+    `by` has one line a label, or is a map's y axis. A line joins the points `along` a dimension if `x` is a variable.
+    `log` names logarithmic axes ("x", "y", "xy"), which show magnitudes.
     """
 
     title: str
