@@ -3,6 +3,7 @@
 import io
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar
 
 import matplotlib
@@ -26,44 +27,16 @@ METRES_PER_INCH = 0.0254
 POINTS_PER_INCH = 72
 """Points in an inch, the units of a PDF page."""
 
-PIXELS_PER_INCH = 300
+SETTINGS: dict[Any, Any] = dict(
+    matplotlib.rc_params_from_file(Path(__file__).with_suffix(".mplstyle"), use_default_template=False)
+)
+"""Settings of matplotlib."""
+
+PIXELS_PER_INCH = SETTINGS["savefig.dpi"]
 """Pixels in an inch of a PNG file."""
 
-SMALL_TEXT = 7.0
+SMALL_TEXT = SETTINGS["legend.fontsize"]
 """Size of the smallest text of a figure [pt], which journals still take at these widths."""
-
-SETTINGS: dict[Any, Any] = {
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "axes.labelsize": 8,
-    "axes.linewidth": 0.7,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 8,
-    "axes.titley": 1.0,  # without a look at what stands on top of the axes, which takes a tenth of drawing
-    "figure.dpi": 100,
-    "figure.titlesize": 8.5,
-    "font.size": 8,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.5,
-    "legend.fontsize": SMALL_TEXT,
-    "legend.frameon": False,
-    "lines.linewidth": 1.2,
-    "lines.markersize": 3.6,
-    "pdf.fonttype": 42,  # TrueType: IEEE and ACM refuse Type 3
-    "ps.fonttype": 42,
-    "savefig.dpi": PIXELS_PER_INCH,
-    "svg.fonttype": "none",
-    "xtick.labelsize": SMALL_TEXT,
-    "xtick.major.size": 2.5,
-    "xtick.minor.pad": 4.5,  # texts of both kinds of ticks on one line
-    "xtick.minor.size": 1.5,
-    "ytick.labelsize": SMALL_TEXT,
-    "ytick.major.size": 2.5,
-    "ytick.minor.pad": 4.5,
-    "ytick.minor.size": 1.5,
-}
 
 TEXT_SIZES = ("axes.labelsize", "axes.titlesize", "figure.titlesize", "font.size", "legend.fontsize", "xtick.labelsize",
               "ytick.labelsize")  # fmt: skip

@@ -118,10 +118,10 @@ def full_name(module: str) -> str:
 
 
 def _files(name: str) -> Iterator[Path]:
-    """File of a module of this package, and the table and the templates of its name."""
+    """File of a module of this package, and the table, the style and the templates of its name."""
     path = PACKAGE.parent.joinpath(*name.split("."))
     yield path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    yield from path.parent.glob(f"{path.name}.csv")
+    yield from (table for ending in (".csv", ".mplstyle") if (table := path.with_suffix(ending)).is_file())
     yield from (path.parent / "templates").glob(f"{path.name}.*.jinja")
 
 
