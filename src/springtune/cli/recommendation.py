@@ -224,7 +224,7 @@ def _to_type(fit: "EngineFit", too_narrow: bool) -> Iterator[str]:
     from ..engines.run import off_text
 
     if found := fit.factor == fit.factor:
-        yield f"type at {fit.result.setting}, for {fit.scene.load}: {fit.typed_text}"
+        yield f"type at {fit.result.setting}, for {fit.scene.load}: {fit._typed_text}"
     best = min(fit.needed, key=lambda one: (not one.found, one.frame_seconds if one.found else abs(one.solver_error)))
     if best.found and (too_narrow or not found):
         yield f"type at {best.setting}, without a factor: {best.typed}"

@@ -236,9 +236,9 @@ class EngineFit(Tabled):
         yield from _typed_rows(ENGINES[self.result.engine], self.typed, self.scene.mesh)
 
     @property
-    def typed_text(self) -> str:
+    def _typed_text(self) -> str:
         """Numbers to type with their units in a line."""
-        return _typed_text(self.typed_rows())
+        return typed_text(self.typed_rows())
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
@@ -250,8 +250,8 @@ class EngineFit(Tabled):
         yield "error", off_text(self.error, self.result.reference)
         if ENGINES[self.result.engine].iterates:
             yield "in other orders", _between(self.spread, self.result.reference)
-        yield "drift across", self.result.drift_text
-        yield "without a factor", self.untuned.parts
+        yield "drift across", self.result._drift_text
+        yield "without a factor", self.untuned._parts
         yield "run", f"{self.result.status} after {self.result.frames} frames"
         yield "damping", f"{self.result.damping:.4g} 1/s, {DAMPING_NOTE}"
         yield "set besides", ENGINES[self.result.engine].besides
@@ -415,7 +415,8 @@ def _with_unit(value: str, unit: str) -> str:
     return value if unit == "1" else f"{value} {unit}"
 
 
-def _typed_text(rows: Iterable[tuple[str, str, str, str]]) -> str:
+def typed_text(rows: Iterable[tuple[str, str, str, str]]) -> str:
+    """Names, values and units of what to type, in one line."""
     return "; ".join(f"{name} {_with_unit(value, unit)}" for name, value, unit, _ in rows)
 
 
@@ -511,7 +512,7 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
         if found or (may_stall and errors[-1] >= STALLED_SHARE * errors[-3]):
             break
     engine = ENGINES[runs.engine]
-    typed = _typed_text(_typed_rows(engine, engine.numbers(net_of(runs.scene), tried.setting), runs.scene.mesh))
+    typed = typed_text(_typed_rows(engine, engine.numbers(net_of(runs.scene), tried.setting), runs.scene.mesh))
     return NeededSetting(raised, tried.setting, found, tried.solver_error, tried.frame_seconds, typed)
 
 

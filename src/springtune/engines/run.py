@@ -191,10 +191,10 @@ class EngineResult(Tabled, Ended):
     @property
     def drifts(self) -> str:
         """A sentence on `drift`."""
-        return f"moves across by {self.drift_text} of what finite elements move along, which 'error' does not say"
+        return f"moves across by {self._drift_text} of what finite elements move along, which 'error' does not say"
 
     @property
-    def drift_text(self) -> str:
+    def _drift_text(self) -> str:
         """Text of `drift`; empty where the run diverged."""
         return error_text(self.drift) if self.drift == self.drift else ""
 
@@ -211,10 +211,10 @@ class EngineResult(Tabled, Ended):
         if self.by_law != self.exact:
             yield "of it law", error_text(self.law_error)
         yield "of it solver", off_text(self.solver_error, self.reference)
-        yield "drift across", self.drift_text
+        yield "drift across", self._drift_text
 
     @property
-    def parts(self) -> str:
+    def _parts(self) -> str:
         """Error in words, with its parts."""
         parts = {"definition": self.definition_error, "law": self.law_error, "solver": self.solver_error}
         each = (f"{name} {off_text(part, self.reference)}" for name, part in parts.items() if part)
