@@ -1,7 +1,6 @@
 """A network as plain arrays in SI units: what another program needs to have the same springs.
 
-Its energy W is the sum of ``k (l - L)^2 / 2`` over springs and of the `Terms` of cells; ``-dW/dx + forces = 0`` at
-rest.
+Its energy W is the sum of ``k (l - L)^2 / 2`` over springs and of the `Terms` of cells.
 """
 
 import inspect

@@ -326,11 +326,11 @@ def relax(
     linear: bool = False,
     max_steps: int = 200_000,
 ) -> Run:
-    r"""Find an equilibrium by dynamic relaxation: explicit steps with fictitious masses and damping.
+    r"""Find an equilibrium under a force over reference stiffness [m] by dynamic relaxation, with fictitious masses.
 
     Masses of twice the row sums of stiffness make a step of 1 stable. Damping is critical for the frequency
     :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` (Underwood, Dynamic relaxation, in:
-    Computational methods for transient analysis, 1983, ch. 5). `load` (n_points, 2) is over the reference [m].
+    Computational methods for transient analysis, 1983, ch. 5).
     """
     # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
     inertia = 0.3 * network.local_stiffness.max(axis=1, initial=0.0, where=~network.held)

@@ -166,7 +166,7 @@ class AreaEnergy(Energy):
 
 @dataclass(frozen=True)
 class AngleEnergy(Energy):
-    r"""Energy of the angles of triangles; `modulus`, (n_cells,) or (n_cells, 3), is over the reference [m2].
+    r"""Energy of triangles' angles; `modulus` (n_cells,) or (n_cells, 3) is beta over the reference stiffness [m2].
 
     .. math:: W = \tfrac{1}{2} \sum_i \beta_i (\theta_i - \theta_{i,0})^2
     """
@@ -236,7 +236,7 @@ class BiquadraticEnergy(Energy):
 
     .. math:: W = \sum_i \tfrac{k_i}{4} q_i^2 + \sum_{i<j} \tfrac{\gamma_{ij}}{2} q_i q_j
 
-    `tensile` k and `coupling` gamma, of sides that meet in a corner, are (n_cells, 3), over the reference [1/m2].
+    `tensile` k and `coupling` gamma (of sides that meet there) are (n_cells, 3), over the reference stiffness [1/m2].
     """
 
     tensile: np.ndarray
@@ -402,12 +402,13 @@ class YeohEnergy(_SheetEnergy):
 
 @dataclass(frozen=True)
 class StableNeoHookeEnergy(_SheetEnergy):
-    r"""Energy of the neo-Hookean membrane that engines have; `shear` and `first` (n_cells,) are Lame's constants [1].
+    r"""Energy of the neo-Hookean membrane that engines have.
 
     .. math:: W = A_0 \left[ \tfrac{\mu}{2} (tr C - 2 J) + \tfrac{\lambda + \mu}{2} (J - 1)^2 \right]
 
     But for a constant the law of Smith, de Goes and Kim (Stable neo-Hookean flesh simulation, ACM TOG 37(2), 2018) in
-    the plane. No sheet of rubber has this law: thickness plays no part. Constants are times it over the reference.
+    the plane. No sheet of rubber has this law: its thickness plays no part. `shear` and `first` (n_cells,) are Lame's
+    constants times the thickness over the reference stiffness [1].
     """
 
     shear: np.ndarray

@@ -136,7 +136,7 @@ def _last_root(
 def assured(errors: np.ndarray) -> np.ndarray:
     """Largest error of each mesh size and all finer ones that were run: a chance crossing of zero promises nothing.
 
-    Arrays are (n_approaches, n_sizes), finest size first, where it is NaN.
+    Arrays are (n_approaches, n_sizes), finest size first. NaN there, and from where a finer one failed.
     """
     errors = np.abs(errors)
     found = np.full(errors.shape, np.nan)

@@ -516,7 +516,10 @@ AnyMaterial = Material | AnisotropicMaterial
 
 
 class EngineeringConstants(NamedTuple):
-    """Engineering constants of a sheet along two axes, as coupons show them: moduli [Pa] and Poisson's ratio [1]."""
+    """Engineering constants of a sheet along two axes, as coupons show them: moduli [Pa] and Poisson's ratio [1].
+
+    `shear_by_x` is the shear angle over the extension when pulled along the first axis; 0 along a material's axes.
+    """
 
     young_modulus_x: float
     young_modulus_y: float

@@ -251,12 +251,7 @@ class Traction:
     group : str
         Sides, or a point.
     force : tuple of float or str
-        Total force along x and y [N], or texts with their unit.
-
-    Raises
-    ------
-    ValueError
-        If it is not a force.
+        Total force along x and y [N], or texts with their unit; ValueError for another unit.
 
     Examples
     --------
@@ -283,14 +278,9 @@ class Pressure:
     group : str
         Sides.
     pressure : float or str
-        [Pa], or a text with its unit.
+        [Pa], or a text with its unit; ValueError for another unit.
     follower : bool, optional
         Whether it turns and grows with the sides, in nonlinear kinematics.
-
-    Raises
-    ------
-    ValueError
-        If it is not a pressure.
 
     Examples
     --------

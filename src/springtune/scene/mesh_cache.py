@@ -73,7 +73,10 @@ def naming_errors(definition: Definition) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """Supports and forces of a load of factor 1 on a mesh, (n_points, 2); `dead` forces keep their direction."""
+    """Supports and forces [N] of a load of factor 1 on a mesh; arrays have shape (n_points, 2).
+
+    `dead` are the forces of `pattern` that keep their direction; None if they are all of one sort.
+    """
 
     key: tuple[object, ...]
     held: np.ndarray

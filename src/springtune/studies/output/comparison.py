@@ -41,7 +41,10 @@ Labels = dict[str, str | float]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Tolerances, either is enough; `relative` is of the larger number, and serves as `absolute` without a unit."""
+    """Tolerances, of which either is enough; `relative` refers to the larger number, or the largest of a curve.
+
+    `absolute` is in the numbers' unit; None is 0, or `relative` for numbers without unit.
+    """
 
     relative: float = RELATIVE_TOLERANCE
     absolute: float | None = None
