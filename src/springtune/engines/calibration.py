@@ -175,8 +175,8 @@ class EngineFit(Tabled):
     >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"], needed=False)
     >>> print(f"{fit.factor:.2f} times, {len(fit.typed['compliance'])} springs; error {100 * fit.error:+.1f} %")
     1.41 times, 205 springs; error -0.0 %
-    >>> print(fit.typed_text, [formula for *_, formula in fit.typed_rows()])
-    compliance inside 0.00093108, on the outline 0.0018622 m/N ['1 / k of a spring']
+    >>> print(*fit.typed_rows())
+    ('compliance', 'inside 0.00093108, on the outline 0.0018622', 'm/N', '1 / k of a spring')
     >>> fit.net().write("tuned.csv")[0].name
     'tuned.csv'
     """

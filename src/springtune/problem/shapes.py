@@ -278,9 +278,14 @@ class Pressure:
     group : str
         Sides.
     pressure : float or str
-        [Pa], or a text with its unit; ValueError for another unit.
+        [Pa], or a text with its unit.
     follower : bool, optional
         Whether it turns and grows with the sides, in nonlinear kinematics.
+
+    Raises
+    ------
+    ValueError
+        If it is not a pressure.
 
     Examples
     --------
