@@ -140,7 +140,7 @@ class Commands(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Command of a name; None if there is none."""
+        """Command of a name, or None."""
         if cmd_name not in COMMANDS:
             return None
         found: click.Command = import_name(f"cli.{COMMANDS[cmd_name][0]}:{cmd_name}")

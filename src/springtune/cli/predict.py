@@ -46,7 +46,7 @@ PROGRESS_SECONDS = 3
 
 
 class Progress(logging.Handler):
-    """Prints now and then what a long search does."""
+    """Prints the progress of a long search every few seconds."""
 
     def __init__(self) -> None:
         super().__init__()

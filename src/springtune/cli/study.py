@@ -141,7 +141,7 @@ def scenes(config: Path, results: Path) -> None:
 
 
 def _stored_text(study: "Study", folder: Path) -> str:
-    """What is stored of a study, and what a run computes."""
+    """Text on a study's stored results, and on what a run computes."""
     from ..studies.runs import plan, rerun, store
 
     if not (folder / TASKS).exists():  # planning 10,000 scenes takes a second

@@ -291,7 +291,7 @@ def version_numbers(text: str) -> tuple[int, ...]:
 
 
 def _is_installed(need: str) -> bool:
-    """Whether a module is installed, in the version that is asked for."""
+    """Whether a module is installed, in the required version or a later one."""
     name, _, least = need.partition(">=")
     if find_spec(name) is None:
         return False
@@ -302,7 +302,7 @@ def _is_installed(need: str) -> bool:
 
 
 def _missing_energies(engine: Engine, net: SpringNet) -> list[str]:
-    """Words for what a net has and an engine has not."""
+    """Names of the energies of a net that an engine lacks, in words."""
     return [ENERGY_WORDS[one.kind] for one in net.energies if one.kind not in engine.laws]
 
 

@@ -450,7 +450,7 @@ def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
 
 
 def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
-    """Find the factor at which the displacement is the reference's; NaN, and why, where there is none."""
+    """Find the factor at which the displacement is the reference's; else NaN and the reason."""
     from scipy.optimize import brentq
 
     def error(softness: float) -> float:
@@ -548,7 +548,7 @@ def _band(runs: _Runs, load: str, tuned: EngineResult) -> LoadBand:
 def best_runnable_scene(
     make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool
 ) -> tuple[Scene | None, str, tuple[str, ...]]:
-    """Scene of the best definition that an engine runs, or None and why there is none; and what was tried."""
+    """Scene of the best definition that an engine runs, or None and the reason; and the definitions tried."""
     body, mesh, material, load, *_ = make.args
     about: dict[str, Any] = {"load": load} if isinstance(body, Shape) else {"loads": loads}
     tried, refused = trial(body, mesh, material, **about), dict[str, str]()

@@ -310,7 +310,7 @@ def in_engine(
 
 
 def with_precision(engine: Engine, setting: Setting) -> Setting:
-    """Return a setting with the engine's own precision where it has none."""
+    """Return a setting with the engine's own precision if it names no other."""
     return setting if setting.precision else replace(setting, precision=engine.precisions[0])
 
 
@@ -428,10 +428,10 @@ def _oscillates(seen: list[np.ndarray]) -> bool:
 
 
 def _frame_seconds(seconds: list[float]) -> float:
-    """Seconds a frame: the median; NaN where none was timed."""
+    """Median seconds of a frame; NaN without a timed one."""
     return float(np.median(seconds)) if seconds else np.nan
 
 
 def frame_text(seconds: float) -> str:
-    """Time of a frame in words; empty where none was timed."""
+    """Time of a frame in words; empty without a timed one."""
     return "" if seconds != seconds else f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{1e3 * seconds:.0f} ms"

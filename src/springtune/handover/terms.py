@@ -98,13 +98,13 @@ class Terms:
 
     @property
     def present(self) -> np.ndarray:
-        """Whether a cell has the energy: in those of other parts all moduli are zero."""
+        """Whether a cell has the energy; cells of other parts have zeros as moduli."""
         return np.any([one.reshape(len(one), -1).any(axis=1) for one in self.moduli.values()], axis=0)
 
 
 @dataclass(frozen=True, eq=False)
 class Net:
-    """A network as plain arrays; `springtune.SpringNet` has what they are."""
+    """A network as plain arrays, which `springtune.SpringNet` describes."""
 
     points: np.ndarray
     springs: np.ndarray

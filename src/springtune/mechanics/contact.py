@@ -64,7 +64,7 @@ MOST_SET_CHANGES = 4
 """How often a Newton step may change which contacts it takes for closed."""
 
 FRICTION_TOLERANCE = 1e-6
-"""As `CONTACT_TOLERANCE`, with friction, which lags a step behind."""
+"""The tolerance in place of `CONTACT_TOLERANCE` with friction, which lags a step behind."""
 
 FRICTION_SLIP = 1e-3
 """Slip over which friction grows to its limit, over the mesh size; what sticks creeps by about as much a load step."""

@@ -47,7 +47,7 @@ class Pattern:
 
     @cached_property
     def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return rows, column pointers, and each entry's place in what `coupling_entries` assembles."""
+        """Return rows, column pointers, and each entry's place in the sums of `coupling_entries`."""
         count, joined = self.shape[0], len(self.springs)
         # Particles that are held in both directions have no blocks.
         free = self.number.max(axis=1) >= 0

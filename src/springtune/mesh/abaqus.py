@@ -42,7 +42,7 @@ class _Section(NamedTuple):
         return MeshError(f"`*{self.keyword}` in line {self.line} {why}")
 
     def items(self) -> Iterator[list[str]]:
-        """Return what is given in each row."""
+        """Return the items of each row."""
         return ([item.strip().strip("'\"") for item in row.split(",")] for row in self.rows)
 
 

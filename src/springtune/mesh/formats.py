@@ -42,7 +42,7 @@ REASONS_BY_ENDING = {
 """Why files are refused by their ending: meshio would miss parts of them, or their groups."""
 
 HDF5_SIGNATURE = b"\x89HDF\r\n"
-"""What files of HDF5 begin with, some after a block of their own."""
+"""First bytes of HDF5 files, some after a block of their own."""
 
 MOST_FILE_BYTES = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""

@@ -145,7 +145,7 @@ OTHER_FILES_REASON = "parts of it are in other files, whose changes would not be
 """Why a file is refused that names other files."""
 
 LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"
-"""What to do with cells that are not read."""
+"""Remedy for cells that are not read."""
 
 
 class Block(NamedTuple):

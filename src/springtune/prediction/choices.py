@@ -65,7 +65,7 @@ References = dict[str, QuantityReference | str]
 
 @dataclass(frozen=True, repr=False)
 class Choice(Tabled):
-    """A definition on a mesh: its stiffness, and what it gets wrong there.
+    """A definition on a mesh: its stiffness and its errors there.
 
     Attributes
     ----------
@@ -206,7 +206,7 @@ def references(beam: Beam, material: Material, loads: Iterable[str] = USUAL_LOAD
 
 
 def reference_of(beam: Beam, material: Material, load: str) -> QuantityReference | str:
-    """Reference of 1 N of any load, or why there is none."""
+    """Reference of any load for 1 N, or the reason why it is missing."""
     try:
         found = unit_reference(beam, material, LOADS[load].kind, LOADS[load].sign)
     except ReferenceNotConvergedError as error:
@@ -344,7 +344,7 @@ def in_order(
 
 
 def only_load(shape: Shape, load: str | None) -> str:
-    """Load case of a shape, its only one where none is named."""
+    """Load case of a shape by name, or its only one."""
     if load is not None:
         return load
     if len(shape.loads) != 1:
@@ -423,7 +423,7 @@ class Trial:
         self.failures: dict[str, dict[str, str]] = {}
 
     def springs(self, name: str) -> Springs | None:
-        """Springs of a definition, derived once; None where it has none, for a reason in `failures`."""
+        """Springs of a definition, derived once; None with a reason in `failures`."""
         if name not in self.same and name not in self.failures:
             try:
                 springs = self.problems[0].springs(DEFINITIONS[name], None)[0]

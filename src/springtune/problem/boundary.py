@@ -12,7 +12,7 @@ from .loads import MIDDLE, LoadKind, Side
 from .shapes import LoadCase, Quantity
 
 FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
-"""Where the profile of a pressed face is given, over its length [1]."""
+"""Places of the profile of a pressed face, over its length [1]."""
 
 POINT_TOLERANCE = 1e-9
 """Distance from a particle below which a point is that particle, over the extent of the mesh [1]."""

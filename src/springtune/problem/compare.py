@@ -1,4 +1,4 @@
-"""Errors of networks against references, and the stiffness at which a sensitivity curve has none."""
+"""Errors of networks against references, and the stiffness without error on a sensitivity curve."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

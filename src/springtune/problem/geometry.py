@@ -8,7 +8,7 @@ from .quantities import Number, positive, put
 
 
 class AssumptionWarning(UserWarning):
-    """An input violates an assumption of the model, such as that of a thin sheet."""
+    """An input violates an assumption of the model, such as a thin sheet."""
 
 
 def _warn(said: str) -> None:

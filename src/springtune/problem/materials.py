@@ -512,7 +512,7 @@ CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")
 """Constants of a sheet in plane stress."""
 
 AnyMaterial = Material | AnisotropicMaterial
-"""What a sheet can be of."""
+"""Materials of a sheet."""
 
 
 class EngineeringConstants(NamedTuple):

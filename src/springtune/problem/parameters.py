@@ -10,7 +10,7 @@ SWEPT = {
 """Description and unit of each by its name in studies and datasets."""
 
 PLANES = "stress", "strain"
-"""What is zero across a sheet."""
+"""Plane stress and plane strain: the quantity that is zero across a sheet."""
 
 OF_BODIES = {
     "thickness": "beam_thickness",

@@ -120,7 +120,7 @@ def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
 
 
 def relative_weights(test: TensileTest) -> np.ndarray:
-    """Return what makes errors of a test's stresses relative [1/Pa], shape (n,)."""
+    """Return weights that make errors of a test's stresses relative [1/Pa], shape (n,)."""
     size = np.abs(test.stress)
     return np.asarray(1 / np.maximum(size, LEAST_STRESS_SHARE * size.max()))
 
@@ -137,7 +137,7 @@ def relative_error(stress: np.ndarray, test: TensileTest) -> float:
 
 
 def check_terms(terms: object, most: int) -> None:
-    """Refuse what is no number of terms."""
+    """Refuse a number of terms that is out of range."""
     if isinstance(terms, bool) or not isinstance(terms, int) or not 1 <= terms <= most:
         raise ValueError(f"terms: {terms!r} is not a number of terms; give 1 to {most}")
 

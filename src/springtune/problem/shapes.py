@@ -46,7 +46,7 @@ def _place(value: Any, name: str) -> Point:
 
 
 def _check_name(value: object, what: str, *, empty: bool = False) -> None:
-    """Refuse what is not allowed as a name."""
+    """Refuse a name that is not allowed."""
     if not (isinstance(value, str) and (NAME.fullmatch(value) or (empty and not value))):
         raise ValueError(f"{what}: {value!r} cannot be a name; {NAME_RULE}")
 
@@ -65,7 +65,7 @@ def _tuple_of(values: Any, wanted: type, name: str) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Segment:
-    """A side of an outline, from its corner to that of the next one.
+    """A side of an outline, from its corner to the next side's corner.
 
     Parameters
     ----------

@@ -21,10 +21,10 @@ _Ends = tuple[int, int]
 """Points at the ends of a side, the lower number first."""
 
 LARGEST_TURN = np.pi / 6
-"""Of the direction of a side of a triangle along an arc [rad]."""
+"""Largest change of direction along a triangle's side on an arc [rad]."""
 
 LARGEST_SAGITTA = 0.15
-"""Of a side of a triangle along an arc, over the distance to what else there is."""
+"""Largest sagitta of a triangle's side on an arc, over the distance to the rest of the outline."""
 
 PIECE_SAMPLES = 7
 """Points on a piece of an outline at which distances are taken."""

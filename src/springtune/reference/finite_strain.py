@@ -52,7 +52,7 @@ PATH_TOLERANCE = 0.01
 """Difference of two meshes' displacements within which they are on the same path."""
 
 LARGEST_BEND = 0.1
-"""As `springtune.mechanics.statics.LARGEST_BEND`."""
+"""Largest bend of the way between two equilibria, as `springtune.mechanics.statics.LARGEST_BEND`."""
 
 
 class FiniteStrainError(ReferenceNotConvergedError):
@@ -146,7 +146,7 @@ class Body:
         return bool(len(path) == 1 and little and self._is_stable(0.5 * moved - bent, stress * middle))
 
     def _is_stable_by_factor(self, factor: SuperLUFactor, moved: np.ndarray, stress: float) -> bool:
-        """Whether an equilibrium is stable, so far as the factor of its tangent tells."""
+        """Whether an equilibrium is stable, judged by the factor of its tangent."""
         try:
             negative = factor.negative_pivots
         except SingularError:  # pivots beside the diagonal

@@ -114,7 +114,7 @@ class Interpolant:
 
     @classmethod
     def from_arrays(cls, kind: LoadKind, arrays: Mapping[str, Any]) -> Self:
-        """Interpolant of what `arrays` gave."""
+        """Interpolant from the arrays that `arrays` returned."""
         (first, last), (least, largest) = (np.asarray(arrays[name]).tolist() for name in ("aspect_range", "nu_range"))
         error_estimate, solves = float(arrays["error_estimate"]), int(arrays["solves"])
         return cls(kind, (first, last), (least, largest), np.asarray(arrays["values"]), error_estimate, solves)

@@ -351,7 +351,7 @@ class Problem:
         return f"; {quantity.of!r} is where {corner.what}: {then}"
 
     def graded(self, layers: int) -> CoarseMesh:
-        """The mesh with so many layers at its corners; asked for in rising order."""
+        """The mesh with so many layers at its corners; call it with rising numbers."""
         while self._layers < layers:
             self._graded.grade(self.rough)
             self._layers += 1
@@ -738,7 +738,7 @@ class Level:
         return self.at(points, self._displacements)
 
     def at(self, points: np.ndarray, value: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
-        """Values at points, some thousand at a time: what locates them takes memory."""
+        """Values at points, some thousand at a time to save memory."""
         points = np.asarray(points, dtype=float)
         chunks = np.array_split(points, max(1, len(points) // 4000))
         return np.concatenate([value(*self._locate(chunk)) for chunk in chunks])

@@ -22,7 +22,7 @@ _memory_lock = threading.RLock()
 
 
 class BeyondSize(ValueError):
-    """A file is larger than what is read."""
+    """A file is larger than the limit for reading."""
 
 
 class DataElsewhere(ValueError):

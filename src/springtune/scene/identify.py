@@ -78,7 +78,7 @@ def vary(constants: dict[str, Any], names: Iterable[str], steps: Iterable[comple
 
 
 def assume_usual(constants: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
-    """Replace named constants by what is usual beside the others."""
+    """Replace named constants by usual values beside the others."""
     found = constants | {name: ratio for name, ratio in USUAL_POISSON_RATIOS.items() if name in names}
     if "G12" in found:
         if ("E1" in names) != ("E2" in names):

@@ -50,7 +50,7 @@ class Block:
     places: np.ndarray
 
     def unshifted(self, columns: np.ndarray) -> np.ndarray:
-        """Columns (n, ...) without what shifts explain."""
+        """Columns (n, ...) without the part that shifts explain."""
         return np.asarray(columns - self.shifts @ (self.shifts.T @ columns))
 
     def by_place(self, columns: np.ndarray) -> np.ndarray:

@@ -80,7 +80,7 @@ class Springs:
 
     @property
     def spring_ratio(self) -> float:
-        """Largest stiffness of a spring over the smallest one [1]; infinite where a spring has none."""
+        """Largest stiffness of a spring over the smallest one [1]; infinite if one is zero."""
         springs = np.abs(self.relative if self.linear_springs is None else self.linear_springs)
         return float(springs.max() / springs.min()) if springs.min() > 0 else np.inf
 

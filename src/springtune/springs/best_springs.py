@@ -1,4 +1,4 @@
-r"""What springs alone can do at best: each stiffness searched for, over a space of loads and the field inside.
+r"""The best that springs alone can do: each stiffness searched for, over a space of loads and the field inside.
 
 The loads are the 15 tests of `springtune.springs.patch_fit`, here for the wanted nu: F are their forces, U0 their
 exact displacements, and 1 their energies. A network has displacements ``U = K(k)^-1 F`` and energies ``M = F^T U``, a

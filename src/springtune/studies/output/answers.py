@@ -91,7 +91,7 @@ def definition_errors(cells: Columns) -> list[DefinitionErrors]:
 
 
 class Answer(NamedTuple):
-    """What to type for a definition on a mesh: different stiffnesses [N/m] of its springs, sorted."""
+    """Stiffnesses [N/m] to type for a definition on a mesh: the different ones of its springs, sorted."""
 
     labels: tuple[str, ...]  # of the mesh type and material
     mesh_size: float

@@ -21,7 +21,7 @@ from ..answers import (
 from ..text import label_text, range_text
 
 Content = dict[str, Any]
-"""What a template shows."""
+"""Values that a template shows."""
 
 
 class Source(NamedTuple):

@@ -199,7 +199,7 @@ REFERENCES = {
     "error": "reference_value",
     "expected_error": "expected_value",
 }
-"""What an error is against, where that is no `reference_displacement`."""
+"""Reference variables of errors, if not `reference_displacement`."""
 
 
 def _mark_beyond_linear(own: Variables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
