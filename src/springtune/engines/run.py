@@ -362,7 +362,7 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
-    """Advance a session until it rests: what is left of the way, by the last changes, is below `tolerance`."""
+    """Advance a session until it rests: the way left, extrapolated from the last changes, is below `tolerance`."""
     seen: list[np.ndarray] = []
     seconds: list[float] = []  # a frame, without the first one, which may compile
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0

@@ -1,13 +1,7 @@
 """Reference for a beam: linear elasticity at small strain, plane stress, by finite elements.
 
-Half of each beam is solved; the dashed line is its axis of symmetry or antisymmetry::
-
-        axial                          bending                            shear
-          ____________________ ->        ____________________            o  o  o  o  o  o
-        //|                  |->       //|                  |^          +-------:-------+ ->
-        //|- - - - - - - - - |->       //|- - - - - - - - - ||          |       :       | ->
-        //|__________________|->       //|__________________||          +-------:-------+
-                                                                        ///////////////
+Half of each beam is solved, along its axis of symmetry or antisymmetry: the upper half if an end is loaded, else the
+left one. The kind ``"face"`` is shear with a force along y and no rollers.
 
 The stress is singular where a clamp meets a free edge. Rectangles shrink geometrically towards the corners, and their
 degree grows with the number of layers: the error falls exponentially (hp version), to 1e-6 with some thousand unknowns.
