@@ -53,7 +53,10 @@ def row(change, jobs="", solved=None):
     for name, count in (solved or {}).items():
         for kind, one in (RESULTS.get(name) or {name: count}).items():
             counts[TABLE["stages"].get(kind, kind)] = counts.get(TABLE["stages"].get(kind, kind), 0) + one
-    return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts)
+    names = {job for name in jobs.split() for job in JOBS.get(name, name).split()}
+    if "calibrate" in names:
+        counts.setdefault("calibrate", 2)  # one a mesh type
+    return Row(change, names, {name: count for name, count in counts.items() if count})
 
 
 def replace(*pairs):

@@ -2,10 +2,13 @@ r"""Springs as bars whose cross-section is the thickness times the dual edge: a 
 
 .. math:: k = E A / L, \quad A = t \sum_T \tfrac{L}{2} \cot \alpha_T,
 
-where the dual edge joins the circumcentres of the cells at the spring, and alpha is the angle opposite to it. Each bar
-is counted as if it were alone: such springs have ``sum k L^2 = 2 E t A``, and an isotropic sheet needs ``3 E t A``. So
-the rule is a third too soft, with nu = 1/3 whatever is asked. Derived here; the rule has no source of its own.
-Assumptions: Delaunay triangles, else a spring is negative.
+where the dual edge joins the circumcentres of the cells at the spring, and alpha is the angle opposite to it. Bars in
+several directions share one sheet, and each is counted as if it were alone: evenly strained, such springs have
+
+.. math:: \sum k L^2 = 2 E t A_{sheet}, \quad \text{and an isotropic sheet needs } 3 E t A_{sheet}.
+
+So the rule is a third too soft: E of 2/3 on equilateral rows, with nu = 1/3 whatever is asked. Derived here; the rule
+has no source of its own. Assumptions: Delaunay triangles, else a spring is negative.
 """
 
 import numpy as np

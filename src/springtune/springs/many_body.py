@@ -9,9 +9,11 @@ On an equilateral lattice of edges a the second term does nothing in dilation an
 
 .. math:: k = \frac{E t}{\sqrt{3} (1 - \nu)}, \quad a_v = \frac{(1 - 3 \nu) E t a}{\sqrt{3} (1 - \nu^2)}
 
-have E and nu there, as LAMMPS itself confirms. At an outline V_0 differs between particles, and the forces have no
-energy. Here the estimate is of each triangle, whose ``V = \sum l^2``, so that the forces have one: springs of nu = 1/3
-that carry the shear modulus, as in `springtune.springs.area`, and
+have E and nu there: the normal stiffness and a times the shear stiffness of `springtune.springs.normal_shear`. LAMMPS
+itself confirms it. At an outline V_0 differs between particles, and the forces have no energy.
+
+Here the estimate is of each triangle, whose ``V = \sum l^2``, so that the forces have one: springs of nu = 1/3 that
+carry the shear modulus, as in `springtune.springs.area`, and
 
 .. math:: W = \tfrac{1}{2} K_A t A_0 \Big( \frac{V - V_0}{V_0} \Big)^2, \quad K_A = \frac{E (3 \nu - 1)}{2 (1 - \nu^2)},
 
@@ -33,6 +35,8 @@ from .lattice import COEFFICIENT, half_weight
 @definition("many-body", order=226, cells=(3,))
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs, and the volume factor of LAMMPS on each triangle: any nu on lattices, no tuning.
+
+    Raises DefinitionError on quadrilaterals.
 
     Source: LAMMPS's manual, ``bond_style bpm/spring``; the form on triangles is ours (read, derived).
     """

@@ -7,11 +7,14 @@ C66``, the rectangle gives its diagonals, each of its sides a and each of its si
           k_a = \frac{t b}{2 a} \Big( C_{11} - K - C_{66} \frac{a^2}{b^2} \Big), \quad
           k_b = \frac{t a}{2 b} \Big( C_{22} - K - C_{66} \frac{b^2}{a^2} \Big),
 
-and its area the energy :math:`\tfrac{1}{2} K t (A - A_0)^2 / A_0`. All four constants are exact for every even strain.
-For C12 = C66, K = 0: springs alone suffice.
+and its area the energy :math:`\tfrac{1}{2} K t (A - A_0)^2 / A_0`. The diagonals, which alone resist shear, add C66
+to C12 as well (Cauchy's relation); the area adds K to C11, C22 and C12. On squares ``k_d = C66 t``, ``k_a = (C11 -
+C12) t / 2`` and ``k_b = (C22 - C12) t / 2``. All four constants are exact for every even strain. For C12 = C66, K =
+0: springs alone suffice.
 
 Suryawanshi and Gupta (Journal of Mechanics of Materials and Structures 18:143, 2023, abstract read) match the
-displacements of one square by further springs; their formulas were not found. The area takes their part here.
+displacements of one square of an orthotropic sheet by further springs; their formulas were not found. Four springs'
+constants cannot, since springs have C12 = C66, so the area takes the part of these here.
 
 No spring is negative on squares while C12 <= C11 and C12 <= C22; else on rectangles whose ratio a / b is from
 ``sqrt(C66 / (C22 - K))`` to ``sqrt((C11 - K) / C66)``. Derived here.

@@ -8,9 +8,12 @@ horizon. At the outline horizons are cut, and on few shells the sum is not the i
           m_i = \sum_j A_j L_{ij},
 
 ``sum k L^2 = 3 E t A`` is exact: the correction of surfaces and of volumes at once, derived here, in the place of
-that by neighbours' volumes (Bobaru and others' handbook; abstract read). Assumptions: many directions, and a horizon
-far below the body's height: with bonds of two or three edges on 5 mm in 40 mm (`springtune.mesh.sheets.bonded`) a
-pressed side moves by a quarter to a half too much, see docs/catalogue.md.
+that by neighbours' volumes (Bobaru and others' handbook; abstract read). nu = 1/3 in plane stress and 1/4 in plane
+strain, as of all central springs.
+
+`springtune.mesh.sheets.bonded` joins the particles within a horizon. Without bonds a horizon is one
+shell, the edges. Assumptions: many directions, and a horizon far below the body's height: with bonds of two or three
+edges on 5 mm in 40 mm a pressed side moves by a quarter to a half too much, see docs/catalogue.md.
 """
 
 import numpy as np

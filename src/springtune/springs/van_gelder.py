@@ -9,10 +9,14 @@ in general
 .. math:: k_c = \sum_T \frac{E t}{1 + \nu} \frac{A_T}{|c|^2}
           + \frac{E t \nu}{1 - \nu^2} \frac{|a|^2 + |b|^2 - |c|^2}{8 A_T}
 
-with a, b the other sides of triangle T; the second term is negative for an obtuse opposite angle. The network's nu
-stays that of the mesh, 1/3 on a lattice, where the general form scales E by (3 - nu) / (3 (1 - nu^2)).
+with a, b the other sides of triangle T. The second term is half the cotangent of the opposite angle: negative for an
+obtuse one.
 
-Public code that cites the article has the form for nu = 0; the general one is derived from its abstract.
+The network's nu stays that of the mesh, 1/3 on a lattice; the general form's nu scales E wrongly, by (3 - nu) / (3 (1
+- nu^2)) on a lattice, where the form for nu = 0 is exact.
+
+Public code that cites the article has the form for nu = 0; the general one is derived from its abstract. Assumptions:
+triangles.
 """
 
 import numpy as np
@@ -31,6 +35,8 @@ def _shapes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 @definition("van-gelder", order=80, cells=(3,))
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the form for nu = 0 (Van Gelder 1998): exact on lattices with no tuning.
+
+    Raises DefinitionError on quadrilaterals.
 
     Source: Van Gelder, J. Graphics Tools 3(2), 1998, its abstract and public code that cites it (read).
     """
