@@ -7,6 +7,7 @@ import gc
 import os
 import re
 import sys
+import threading
 import time
 import warnings
 from pathlib import Path
@@ -183,6 +184,9 @@ def end(how):
     from springtune.studies.output import summary  # here: only a run needs it
 
     locks.unlock()
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):  # Snakemake's, to look for jobs to start: it would hold up the end
+            thread.cancel()
     text = getattr(summary, how)(*rerun.STUDIES_READ[0], BEGUN)
     text += "".join(summary.beside(*one, BEGUN) for one in rerun.STUDIES_READ[1:])
     logger.info(text, extra={"ends": True})
