@@ -79,6 +79,17 @@ def test_a_file_that_is_none_is_one_sentence(path, content):
         store.read(path, RESULTS)
 
 
+def test_a_file_of_another_version_is_written_anew(path, monkeypatch):
+    with monkeypatch.context() as before:
+        before.setattr(store, "LAYOUT", 1)
+        store.add(path, {"old": {"field": np.ones(2)}})
+    assert store.stored_keys(path) == set()
+    with pytest.raises(store.DamagedError, match="another version of springtune wrote it; delete it"):
+        store.read_all(path)
+    store.add(path, {"new": {"displacement": 1.0}})
+    assert store.read_all(path) == {"new": {"displacement": 1.0}}
+
+
 def test_a_file_of_another_name_is_not_read(path):
     """Such as two blocks of samples, whose results have the same keys."""
     other = path.rename(path.with_name("other.h5"))

@@ -8,7 +8,7 @@ import io
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     import h5py
 
 SCALARS = "scalars"
+
+LAYOUT = 2
+"""Number of the layout of files, which changes with it."""
 
 Places = dict[str, dict[str, tuple[str, int]]]
 """Dataset and row of arrays, by key and label."""
@@ -39,6 +42,10 @@ class DamagedError(Exception):
         return f"{self.args[0]}: {self.args[1]}; {remedy} the same command again, which makes it anew"
 
 
+class OtherLayoutError(DamagedError):
+    """Another version of this package wrote a stored file."""
+
+
 @contextmanager
 def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]], Places]]":
     """Context of a file, its scalars by key and label, and the places of its arrays."""
@@ -48,7 +55,10 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
         raise DamagedError(path, "it is missing")
     try:
         with h5py.File(path) as file:
-            name, scalars, places = json.loads(file[SCALARS][()].tobytes())
+            layout, *content = json.loads(file[SCALARS][()].tobytes())
+            if layout != LAYOUT:
+                raise OtherLayoutError(path, "another version of springtune wrote it")
+            name, scalars, places = content
             if name != Path(path).name:
                 raise ValueError(f"it is {name}")
             yield file, scalars, places
@@ -58,10 +68,12 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
 
 
 def stored_keys(path: str | Path) -> set[str]:
-    """Keys of stored results."""
+    """Keys of stored results; of another layout none, so that it is written anew."""
     if not Path(path).exists():
         return set()
-    return set(read_all(path))
+    with suppress(OtherLayoutError):
+        return set(read_all(path))
+    return set()
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
@@ -144,7 +156,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
             stack = f"{label}_{len(file)}"
             places |= {name: places[name] | {label: (stack, row)} for row, (name, _) in enumerate(members)}
             _put(file, stack, np.stack([value for _, value in members]))
-        content = json.dumps([Path(path).name, scalars, places]).encode()
+        content = json.dumps([LAYOUT, Path(path).name, scalars, places]).encode()
         _put(file, SCALARS, np.frombuffer(content, np.uint8)[np.newaxis])
     atomic.write_bytes(path, image.getvalue())
 
