@@ -21,6 +21,8 @@ from springtune.problem.parameters import SWEPT
 from springtune.problem.status import Status
 from springtune.safe_io.atomic import replacing
 
+from ..config.kind import EMPTY_VALUES
+
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
 
@@ -127,7 +129,7 @@ def most_requested(root: xr.Dataset, dimension: str) -> str:
     return str(counts[dimension].values[int(counts.values.argmax())])
 
 
-NO_NODE = np.int32(-1)
+NO_NODE = EMPTY_VALUES["no node"]
 """Fill value of UGRID connectivities."""
 
 UGRID: dict[str, dict[str, object]] = {

@@ -82,9 +82,9 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
     with _opened(path) as (file, scalars, places):
         lacking = sum(name not in scalars for name in names)
         results = {name: dict(scalars[name]) for name in names if name in scalars}
-        dataset = cache(file.__getitem__)
-        for name, result in results.items():
-            for label in places[name].keys() & set(fields):
+        dataset, labels = cache(file.__getitem__), set(fields)
+        for name, result in results.items() if labels else ():
+            for label in places[name].keys() & labels:
                 stack, row = places[name][label]
                 result[label] = dataset(stack)[row]
     if lacking:

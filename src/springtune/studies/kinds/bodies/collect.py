@@ -287,14 +287,14 @@ def _rest_rows(study, folder):
     shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
     meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
     yield from (mesh.labels | _mesh_row(found.mesh) for mesh, found in meshes.items() if found)
-    compared = set()  # scenes differ in their definitions
+    outlined = set()  # scenes differ in their meshes and definitions
     for scene in shown:
         labels = study.labels(scene)
         yield labels | {f"{SHOWN_PREFIX}{name}": labels[name] for name in study.swept}
         one = Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
-        if (scene.mesh, one) in compared:
+        if one in outlined:
             continue
-        compared.add((scene.mesh, one))
+        outlined.add(one)
         result = _reference(study, folder, one, ["x", "y", "displacements"])
         if "x" not in result:
             continue
