@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import springtune as st
-from springtune.mechanics.moduli import unit_fields, work_of
+from springtune.mechanics.continuum import unit_fields, work_of
 from springtune.mechanics.network import Network
 from springtune.mesh import braced, lattice
 from springtune.springs import DefinitionError

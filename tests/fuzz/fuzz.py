@@ -31,7 +31,7 @@ import numpy as np
 import yaml
 
 import springtune as st
-from springtune.mechanics.moduli import PatchTest
+from springtune.mechanics.continuum import PatchTest
 from springtune.mesh import corner_angles, read_beam_mesh, signed_areas, write_mesh
 from springtune.mesh.formats import read_shape
 from springtune.mesh.sheets import sheet_fault

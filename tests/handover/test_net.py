@@ -13,8 +13,8 @@ import springtune as st
 from mechanics import angle_forces, area_forces, area_of, spring_forces
 from springtune.cli import main
 from springtune.handover.newton import membrane
+from springtune.mechanics import EXPLICIT, IMPLICIT
 from springtune.mechanics.energies import AreaEnergy
-from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
 from tables import cases
 

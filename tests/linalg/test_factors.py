@@ -11,9 +11,9 @@ from scipy.sparse import csc_array, csr_array
 
 import springtune as st
 from springtune.linalg import factors, kernels
-from springtune.linalg.blocks import Blocks, chunked, dense, first_grid, next_grid, row_pointers
 from springtune.linalg.factors import Analysis, SingularError, factorize, factorize_pinned, spread
-from springtune.linalg.multigrid import IndefiniteError, Multigrid, galerkin
+from springtune.linalg.kernels import Blocks, row_pointers
+from springtune.linalg.multigrid import IndefiniteError, Multigrid, chunked, dense, first_grid, galerkin, next_grid
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINS_FROM_UNKNOWNS, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
@@ -262,7 +262,7 @@ def test_coarse_matrices_are_galerkins(seed, coarsening):
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_chunks_of_rows_multiply_and_precondition_the_same_with_any_number_of_threads(monkeypatch, threads):
-    monkeypatch.setattr("springtune.linalg.blocks.ROWS_PER_CHUNK", 1)
+    monkeypatch.setattr("springtune.linalg.multigrid.ROWS_PER_CHUNK", 1)
     monkeypatch.setattr("springtune.linalg.multigrid.THREADS", threads)
     points, matrix, full = scattered_blocks(np.random.default_rng(0), 300)
     factor = Multigrid(matrix, points, np.zeros(points.shape, dtype=bool))

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.mechanics import stepping
+from springtune.mechanics import EXPLICIT, INTEGRATORS, BackwardEuler, stepping
 from springtune.mechanics.continuation import buckling
+from springtune.mechanics.continuum import ends
 from springtune.mechanics.dynamics import Motion, masses, relax
-from springtune.mechanics.integrators import EXPLICIT, INTEGRATORS, BackwardEuler
-from springtune.mechanics.moduli import ends
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import lattice

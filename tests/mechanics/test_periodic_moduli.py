@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 import springtune as st
 from periodic import affine_stiffness, periodic_delaunay, periodic_stiffness
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.moduli import PatchTest, free_body, mean_gradient, outline_forces
+from springtune.mechanics.continuum import PatchTest, free_body, mean_gradient, outline_forces
 from springtune.mechanics.network import Network
 from springtune.mesh import signed_areas
 

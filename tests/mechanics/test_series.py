@@ -7,9 +7,8 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.mechanics.continuation import follow, smallest_share
-from springtune.mechanics.expansion import SERIES_ORDER, Expansion
 from springtune.mechanics.series import StablePath, trace
-from springtune.mechanics.statics import StaticProblem
+from springtune.mechanics.statics import SERIES_ORDER, Expansion, StaticProblem
 from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import best_stiffness
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR

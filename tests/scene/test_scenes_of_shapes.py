@@ -10,9 +10,9 @@ from hypothesis import strategies as some
 import shapes_of_others as others
 import springtune as st
 from springtune.mechanics.continuation import follow
+from springtune.mechanics.continuum import cell_stresses, particle_stresses
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mechanics.stress import cell_stresses, particle_stresses
 from springtune.problem.boundary import cell_at, displacement_weights, forces
 from springtune.problem.geometry import AssumptionWarning
 

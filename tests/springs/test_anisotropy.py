@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 
 import springtune as st
 from periodic import affine_stiffness
-from springtune.mechanics.moduli import PatchTest
+from springtune.mechanics.continuum import PatchTest
 from springtune.mesh import lattice, signed_areas
 from springtune.springs.parts import derive_by_parts
 

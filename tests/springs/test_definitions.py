@@ -11,7 +11,7 @@ from hypothesis import strategies as some
 from scipy.optimize import nnls
 
 import springtune as st
-from springtune.mechanics.moduli import PatchTest
+from springtune.mechanics.continuum import PatchTest
 from springtune.mechanics.network import Network
 from springtune.mesh import lattice, signed_areas
 from springtune.springs.element_fit import least_squares

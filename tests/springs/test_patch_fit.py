@@ -10,7 +10,7 @@ from hypothesis import strategies as some
 
 import shapes_of_others as others
 import springtune as st
-from springtune.mechanics.moduli import PatchTest, isotropic_moduli, strip_fault
+from springtune.mechanics.continuum import PatchTest, isotropic_moduli, strip_fault
 from springtune.mechanics.network import Network
 from springtune.mesh import lattice, signed_areas
 from springtune.springs.patch_fit import TESTS, outline_tests

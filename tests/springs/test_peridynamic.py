@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.mechanics.moduli import PatchTest
+from springtune.mechanics.continuum import PatchTest
 from springtune.mesh import lattice, write_mesh
 from springtune.mesh.sheets import bonded
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import springtune as st
-from springtune.mechanics.moduli import PatchTest
+from springtune.mechanics.continuum import PatchTest
 from springtune.mesh import ROW_HEIGHT, lattice
 
 HEIGHT, SIZE = 20e-3, 2e-3

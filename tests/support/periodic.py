@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 
 import springtune as st
 from springtune.linalg.factors import SingularError, SuperLUFactor
-from springtune.mechanics.moduli import unit_fields, work_of
+from springtune.mechanics.continuum import unit_fields, work_of
 from springtune.mechanics.network import Network
 from springtune.mesh import signed_areas
 

@@ -16,8 +16,8 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..handover.simulation import ENERGY_WORDS
 from ..handover.terms import Net
+from ..mechanics import PRECISIONS
 from ..mechanics.energies import Energy
-from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
 from ..registry import Declaration, Registry, how_to_install
 from ..safe_io.tables import number_text

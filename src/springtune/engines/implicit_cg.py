@@ -10,8 +10,8 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..handover.simulation import network_of
 from ..handover.terms import FORMULAS
+from ..mechanics import BackwardEuler
 from ..mechanics.dynamics import Motion
-from ..mechanics.integrators import BackwardEuler
 from ..mechanics.stepping import make_stepper
 from .base import Setting, engine
 from .textbook import energy_parameters

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..mechanics import IMPLICIT, INTEGRATORS
 from ..mechanics.dynamics import masses
-from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh.cells import Mesh
 from ..problem.compare import error_text, sign_sentence
 from ..problem.geometry import Beam

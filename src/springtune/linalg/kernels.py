@@ -5,13 +5,48 @@ with any number of threads. Fields are (rows, 2); `first` and `last` are the chu
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy import ndarray as Field
 
-from .blocks import Blocks, Chunks, Grid
+
+class Blocks(NamedTuple):
+    """Symmetric matrix: `blocks` (n_blocks, 4) right of the `diagonal` (n_points, 3: xx, xy, yy), row by row."""
+
+    pointers: np.ndarray
+    columns: np.ndarray
+    blocks: np.ndarray
+    diagonal: np.ndarray
+
+
+class Chunks(NamedTuple):
+    """Matrix in chunks of rows; blocks that couple two chunks are kept apart, and its diagonal is inverted."""
+
+    starts: np.ndarray
+    pointers: np.ndarray
+    columns: np.ndarray
+    blocks: np.ndarray
+    diagonal: np.ndarray
+    rows_between: np.ndarray
+    columns_between: np.ndarray
+    blocks_between: np.ndarray
+    rows_added: np.ndarray
+    added: np.ndarray
+
+
+class Grid(NamedTuple):
+    """Cell of a regular grid that each point is in, its place there from 0 to 1, and the numbers of nodes."""
+
+    cells: np.ndarray
+    at: np.ndarray
+    shape: tuple[int, int]
+
+
+def row_pointers(rows: np.ndarray, count: int) -> np.ndarray:
+    """Start of each row among sorted rows, shape (count + 1,)."""
+    return np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))]).astype(np.int32)
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -18,7 +18,7 @@ from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
 from ..mesh.sheets import free_motion
 from ..safe_io.tables import Tabled
-from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
+from . import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
 from .statics import StaticProblem

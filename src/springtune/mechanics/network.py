@@ -11,17 +11,20 @@ equal F/k.
 import copy
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from ..linalg import SOLVERS
-from ..linalg.blocks import Blocks
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
 from ..mesh.cells import Mesh
 from ..mesh.sheets import check_held
 from .energies import Energy
 from .pattern import Pattern
+
+if TYPE_CHECKING:
+    from ..linalg.kernels import Blocks
 
 MULTIGRID_FROM_UNKNOWNS = 200_000
 """Unknowns above which multigrid replaces SuperLU: as fast there, with a third of the memory."""
@@ -236,7 +239,7 @@ class Network:
             data -= s * self._pattern.entries(load.edges, load.derivative)
         return self._pattern.matrix(data)
 
-    def blocks(self, displacements: np.ndarray | None = None) -> Blocks:
+    def blocks(self, displacements: np.ndarray | None = None) -> "Blocks":
         """Return `tangent` in blocks of 2 x 2."""
         return self._pattern.blocks(self._couplings(displacements))
 

@@ -1,16 +1,21 @@
 """Numbering of the unknowns of networks on one mesh, sparsity of their matrices, and order of elimination."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from ..linalg.blocks import Blocks, row_pointers
 from ..linalg.factors import Analysis, nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
+
+if TYPE_CHECKING:
+    from ..linalg.kernels import Blocks
 
 DISSECTION_FROM_UNKNOWNS = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
@@ -73,7 +78,7 @@ class Pattern:
         indices, pointers = (part.astype(np.int32, copy=False) for part in (entries.indices, entries.indptr))
         return indices, pointers, entries.data.astype(np.int64)
 
-    def moved(self, mesh: Mesh) -> "Pattern":
+    def moved(self, mesh: Mesh) -> Pattern:
         """Return the pattern of a mesh with the same cells at other points."""
         found = copy(self)
         found.mesh = mesh
@@ -194,6 +199,8 @@ class Pattern:
 
     def blocks(self, couplings: np.ndarray) -> Blocks:
         """Return the tangent in blocks, as `coupling_entries`, with zeros where directions are held."""
+        from ..linalg.kernels import Blocks, row_pointers  # here: few networks are so large
+
         free: np.ndarray = self.number >= 0
         blocks = np.ascontiguousarray(couplings.reshape(4, -1).T)
         diagonal = np.ascontiguousarray(self._own(couplings).T)

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..linalg.factors import Factor, SingularError
-from .expansion import Expansion
-from .statics import HIGH_ORDER, StaticProblem
+from .statics import HIGH_ORDER, Expansion, StaticProblem
 
 CURVE_TOLERANCE = 1e-7
 """Largest estimated relative error of a displacement on a sensitivity curve."""

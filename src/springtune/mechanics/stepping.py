@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg
 
 from ..linalg.factors import Factor, factorize, narrow
-from .integrators import EXPLICIT, LAGGED, BackwardEuler
+from . import EXPLICIT, LAGGED, BackwardEuler
 from .network import Network
 
 LEAST_ENTRIES_A_THREAD = 5000

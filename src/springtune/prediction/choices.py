@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
+from ..mechanics.continuum import PatchTest
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
-from ..mechanics.moduli import PatchTest
 from ..mechanics.statics import SingularError
 from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh

@@ -16,8 +16,8 @@ from ..mesh.groups import GroupedMesh
 from ..problem.materials import AnyMaterial, Material
 from ..problem.shapes import LoadCase, Shape
 from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law_of, matrix_of, strain_of
-from .shapes import LOWEST_DEGREE, Level, Problem, ShapeReference, inverse_of, solve_shape
-from .triangles import local_functions, side_functions, tabulated
+from .shapes import LOWEST_DEGREE, Level, Problem, ShapeReference, solve_shape
+from .triangles import inverse_of, local_functions, side_functions, tabulated
 
 TOLERANCE = 1e-3
 """Largest accepted relative error estimate."""

@@ -15,9 +15,20 @@ from ..mesh.sheets import check_held
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .answers import most_rotation_and_strain
-from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
 from .small_strain import ReferenceNotConvergedError
-from .triangles import SIDE_CORNERS, function_counts, shape_functions, side_fit, side_functions, tabulated
+from .triangles import (
+    LARGEST_TURN,
+    CoarseMesh,
+    Corner,
+    Side,
+    Space,
+    corners_of,
+    inverse_of,
+    is_unfolded,
+    outline_mesh,
+    shape_functions,
+    tabulated,
+)
 
 #: Degrees of the first level and of the last one tried.
 LOWEST_DEGREE, HIGHEST_DEGREE = 2, 10
@@ -232,7 +243,7 @@ class Problem:
             for layers, mesh in enumerate(graded):
                 for _ in range(layers):
                     mesh.grade(self.rough)
-            if all(_is_unfolded(mesh) for mesh in (self.mesh, *graded)):
+            if all(is_unfolded(mesh) for mesh in (self.mesh, *graded)):
                 return
         raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
 
@@ -360,91 +371,6 @@ class Problem:
     def size(self, degree: int) -> int:
         """Entries of the matrices of a level, about."""
         return len(self._graded.triangles) * ((degree + 1) * (degree + 2)) ** 2
-
-
-def _is_unfolded(mesh: CoarseMesh) -> bool:
-    """Whether all triangles are the right way round everywhere."""
-    if not (signed_areas(mesh.points, mesh.triangles) > 0).all():
-        return False
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
-    try:
-        for degree in (2, 4):
-            gradients = tabulated(degree, 10)[3], shape_functions(degree, corners)[1]
-            Space(mesh, degree).jacobians(np.concatenate(gradients))
-    except MeshError:
-        return False
-    return True
-
-
-class Space:
-    """Polynomials of one degree on the triangles of a mesh."""
-
-    def __init__(self, mesh: CoarseMesh, degree: int) -> None:
-        self.mesh, self.degree = mesh, degree
-        self.corners = corners = np.sort(mesh.triangles, axis=1)
-        one, two = (mesh.points[corners[:, i]] - mesh.points[corners[:, 0]] for i in (1, 2))
-        self.sense = np.sign(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
-        n_points = len(mesh.points)
-        pairs = np.concatenate([corners[:, pair] for pair in SIDE_CORNERS])
-        codes, places = np.unique(pairs[:, 0] * n_points + pairs[:, 1], return_inverse=True)
-        self.edges = np.stack(np.divmod(codes, n_points), axis=1)
-        of_triangles = places.reshape(3, -1).T
-        per_side, inside = function_counts(degree)
-        self.n_outer = n_points + len(codes) * per_side
-        self.n_functions = self.n_outer + len(corners) * inside
-        on_sides = n_points + of_triangles[:, :, None] * per_side + np.arange(per_side)
-        within = self.n_outer + np.arange(len(corners))[:, None] * inside + np.arange(inside)
-        self.n_local_outer = 3 + 3 * per_side
-        self.numbers = np.concatenate([corners, on_sides.reshape(len(corners), -1), within], axis=1)
-        # Where the triangles are: coefficients of the same functions (isoparametric).
-        self.places = np.zeros((self.n_functions, 2))
-        self.places[:n_points] = mesh.points
-        self.codes = codes
-        along, inverse = side_fit(degree)
-        curved = [ends for ends, side in mesh.sides.items() if side.arc is not None]
-        for ends in curved:
-            start, end = mesh.points[ends[0]], mesh.points[ends[1]]
-            straight = (start + end) / 2 + along[:, None] * (end - start) / 2
-            self.places[self.on_side(ends)[2:]] = inverse @ (mesh.curve(ends, along) - straight)
-        bent = np.zeros(len(codes), dtype=bool)
-        bent[[self._edge(ends) for ends in curved]] = True
-        self.curved = np.asarray(bent[of_triangles].any(axis=1))
-
-    def _edge(self, ends: tuple[int, int]) -> int:
-        return int(np.searchsorted(self.codes, ends[0] * len(self.mesh.points) + ends[1]))
-
-    def on_side(self, ends: tuple[int, int]) -> np.ndarray:
-        """Functions on a side, as in `side_functions`."""
-        per_side = self.degree - 1
-        first = len(self.mesh.points) + self._edge(ends) * per_side
-        return np.concatenate([np.array(ends), np.arange(first, first + per_side)])
-
-    def jacobians(self, gradients: np.ndarray, rows: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of places (n, points, 2, 2), last by reference coordinate, and determinants; refuse folds."""
-        at = self.places[self.numbers[rows]]
-        derivatives = np.einsum("eic,qia->eqca", at, gradients, optimize=True)
-        determinants = derivatives[..., 0, 0] * derivatives[..., 1, 1] - derivatives[..., 0, 1] * derivatives[..., 1, 0]
-        folded = (determinants * self.sense[rows, None] <= 0).any(axis=1)
-        if folded.any():
-            x, y = 1e3 * self.mesh.points[self.corners[rows][folded][0]].mean(axis=0)
-            raise MeshError(f"a triangle folds along an arc near ({x:.4g}, {y:.4g}) mm; give the arc as shorter arcs")
-        return derivatives, determinants
-
-    def side_points(self, ends: tuple[int, int], outwards: float, count: int) -> tuple[np.ndarray, ...]:
-        """Functions, points, outward normals times length, and weights at Gauss points of a side."""
-        along, weights = np.polynomial.legendre.leggauss(count)
-        values, slopes = side_functions(self.degree, along)
-        at = self.places[self.on_side(ends)]
-        tangents = slopes @ at
-        return values, values @ at, outwards * np.stack([tangents[:, 1], -tangents[:, 0]], axis=1), weights
-
-
-def inverse_of(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
-    """Inverses of 2 x 2 matrices, shape (..., 2, 2)."""
-    inverse = np.empty_like(matrices)
-    inverse[..., 0, 0], inverse[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
-    inverse[..., 0, 1], inverse[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
-    return inverse / determinants[..., None, None]
 
 
 VOIGT = np.array([[0, 2], [2, 1]])

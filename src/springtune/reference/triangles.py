@@ -1,19 +1,468 @@
-"""Polynomials of any degree on triangles with straight or curved sides.
+"""Coarse triangles of a shape, graded towards its corners, and polynomials of any degree on them.
+
+Sides of triangles lie on the shape's arcs. Triangles at a corner are cut at a fifth of their sides, again and again,
+conforming with their neighbours.
 
 Shape functions are hierarchical (Szabo and Babuska, Finite Element Analysis, 1991, chapter 6): one a corner, degree - 1
 a side and the rest inside. Corners are numbered upwards, so that neighbours agree on a side's direction.
 """
 
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.polynomial.legendre import Legendre, legder, leggauss, legval
+from scipy import spatial
+
+from ..mesh.cells import MeshError, signed_areas
+from ..mesh.free import triangulate, upright
+from ..mesh.groups import GroupedMesh, part_names
+from ..mesh.sides import OutlineSide, Point
+from ..problem.shapes import Shape
+from .small_strain import ELEMENT_GROWTH, SHRINKAGE
+
+_Ends = tuple[int, int]
+"""Points at the ends of a side, the lower number first."""
+
+LARGEST_TURN = np.pi / 6
+"""Largest change of direction along a triangle's side on an arc [rad]."""
+
+LARGEST_SAGITTA = 0.15
+"""Largest sagitta of a triangle's side on an arc, over the distance to the rest of the outline."""
+
+PIECE_SAMPLES = 7
+"""Points on a piece of an outline at which distances are taken."""
+
+LENGTH_TOLERANCE = 1e-9
+"""Distance that counts as zero, over the extent of a shape."""
+
+STRAIGHT_TURN = 1e-6
+"""Turn of a polygon that counts as zero [rad]."""
+
+SMOOTH_TURN = np.radians(12)
+"""Turn of an outline that needs no smaller triangles [rad]: a polygon that stands for a circle."""
+
+SMALL_TURN = 1e-3
+"""Turn of an outline that counts as zero for stresses [rad]."""
+
+UNGRADED_ANGLE = np.radians(91)
+"""Largest angle of a corner without supports and loads that needs no grading [rad]."""
+
+LEAST_SIDES_ALONG = 4
+"""Sides of triangles along the extent of a shape, at least."""
+
 
 SIDE_CORNERS = ((0, 1), (1, 2), (0, 2))
 """Corners of the sides of a triangle whose corners are numbered upwards, from the lower number to the higher one."""
 
 CORNER_GRADIENTS = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
 """Gradients of the corners' shape functions in the reference triangle."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """Side of a triangle on the outline or between parts; `span` runs from the lower corner's parameter on the arc."""
+
+    groups: tuple[str, ...] = ()
+    arc: OutlineSide | None = None
+    span: tuple[float, float] = (0.0, 1.0)
+
+
+@dataclass(eq=False)
+class CoarseMesh:
+    """Triangles (n, 3), counter-clockwise, their parts' numbers (n,), and sides on the outline and between parts."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+    parts: np.ndarray
+    names: tuple[str, ...]
+    sides: dict[_Ends, Side]
+    named: dict[str, int]
+
+    def copy(self) -> "CoarseMesh":
+        """A mesh that may be cut for itself."""
+        return replace(self, sides=dict(self.sides))
+
+    def curve(self, ends: _Ends, along: np.ndarray) -> np.ndarray:
+        """Points of a side, shape (n, 2) [m], from -1 at the corner of the lower number to 1."""
+        side = self.sides.get(ends)
+        share = (along + 1) / 2
+        if side is None or side.arc is None:
+            return self.points[ends[0]] + share[:, None] * (self.points[ends[1]] - self.points[ends[0]])
+        return _points(side.arc, side.span, share)
+
+    def _cut_side(self, first: int, second: int, share: float, new: int) -> np.ndarray:
+        """The point a share of the way from one corner to another, and its number in the places of `sides`."""
+        ends = (min(first, second), max(first, second))
+        side = self.sides.get(ends)
+        if side is None:
+            return self.points[first] + share * (self.points[second] - self.points[first])
+        if first != ends[0]:
+            share = 1 - share
+        where = self.curve(ends, np.array([2 * share - 1]))[0]
+        middle = side.span[0] + share * (side.span[1] - side.span[0])
+        del self.sides[ends]
+        self.sides[ends[0], new] = replace(side, span=(side.span[0], middle))
+        self.sides[ends[1], new] = replace(side, span=(side.span[1], middle))
+        return where
+
+    def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]], parts: list[int]) -> None:
+        self.triangles = np.concatenate([np.delete(self.triangles, rows, axis=0), np.array(triangles)])
+        self.parts = np.concatenate([np.delete(self.parts, rows), np.array(parts)])
+
+    def bisect(self, first: int, second: int) -> None:
+        """Split a side, and the triangles at it, in the middle."""
+        new = len(self.points)
+        where = self._cut_side(first, second, 0.5, new)
+        self.points = np.concatenate([self.points, where[None]])
+        rows = np.flatnonzero((self.triangles == first).any(axis=1) & (self.triangles == second).any(axis=1))
+        triangles, parts = [], []
+        for row in rows:
+            a, b, c = (int(corner) for corner in self.triangles[row])
+            while {a, b} != {first, second}:
+                a, b, c = b, c, a
+            triangles += [(a, new, c), (new, b, c)]
+            parts += [int(self.parts[row])] * 2
+        self._replace(rows, triangles, parts)
+
+    def insert(self, name: str, where: np.ndarray) -> None:
+        """Make a point inside, shape (2,) [m], a named corner of triangles."""
+        near = np.argsort(np.linalg.norm(self.points - where, axis=1))
+        fixed = {end for ends in self.sides for end in ends} | set(self.named.values())
+        for point in near[:3]:
+            moved = self.points.copy()
+            moved[point] = where
+            around = self.triangles[(self.triangles == point).any(axis=1)]
+            if int(point) not in fixed and len(around) and _are_well_shaped(moved, around):
+                self.points, self.named = moved, self.named | {name: int(point)}
+                return
+        corners = self.points[self.triangles]
+        shares = np.stack([_area(where, corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]) for i in range(3)], axis=1)
+        row = int(np.argmax(shares.min(axis=1) / signed_areas(self.points, self.triangles)))
+        a, b, c = (int(corner) for corner in self.triangles[row])
+        new = len(self.points)
+        self.points, self.named = np.concatenate([self.points, where[None]]), self.named | {name: new}
+        self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)], [int(self.parts[row])] * 3)
+
+    def part_sides(self) -> dict[_Ends, list[tuple[int, bool]]]:
+        """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
+        wanted: dict[_Ends, list[tuple[int, bool]]] = {ends: [] for ends in self.sides}
+        corners = np.zeros(self.triangles.max() + 1, dtype=bool)
+        corners[[end for ends in wanted for end in ends]] = True
+        for i in range(3):
+            starts, ends = self.triangles[:, i], self.triangles[:, (i + 1) % 3]
+            for row in np.flatnonzero(corners[starts] & corners[ends]):
+                start, end = int(starts[row]), int(ends[row])
+                if (found := wanted.get((min(start, end), max(start, end)))) is not None:
+                    found.append((int(row), start < end))
+        return wanted
+
+    def isolate(self, corners: Iterable[int]) -> None:
+        """Bisect sides until no triangle has two of some corners."""
+        chosen = np.array(sorted(corners), dtype=int)
+        while True:
+            among = np.isin(self.triangles, chosen)
+            rows = np.flatnonzero(among.sum(axis=1) > 1)
+            if not len(rows):
+                return
+            several = [sorted(self.triangles[row][among[row]].tolist()) for row in rows]
+            self.bisect(*min(pair for corners in several for pair in combinations(corners, 2)))
+
+    def grade(self, corners: Iterable[int]) -> None:
+        """Cut the triangles at corners, of which no triangle has two, once."""
+        for corner in sorted(corners):
+            rows = np.flatnonzero((self.triangles == corner).any(axis=1))
+            cuts: dict[int, int] = {}
+            wheres: list[np.ndarray] = []
+            triangles, parts = [], []
+            for row in rows:
+                v, a, b = (int(point) for point in self.triangles[row])
+                while v != corner:
+                    v, a, b = a, b, v
+                for end in (a, b):
+                    if end not in cuts:
+                        cuts[end] = len(self.points) + len(wheres)
+                        wheres.append(self._cut_side(corner, end, SHRINKAGE, cuts[end]))
+                near, far = cuts[a], cuts[b]
+                triangles += [(v, near, far)]
+                if np.linalg.norm(wheres[near - len(self.points)] - self.points[b]) < np.linalg.norm(
+                    wheres[far - len(self.points)] - self.points[a]
+                ):
+                    triangles += [(near, a, b), (near, b, far)]
+                else:
+                    triangles += [(near, a, far), (a, b, far)]
+                parts += [int(self.parts[row])] * 3
+            self.points = np.concatenate([self.points, np.array(wheres)])
+            self._replace(rows, triangles, parts)
+
+
+def _area(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> np.ndarray:
+    one, other = second - first, third - first
+    return 0.5 * (one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+
+
+def _are_well_shaped(points: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether triangles are counter-clockwise and not flat."""
+    sides = points[triangles] - points[np.roll(triangles, 1, axis=1)]
+    return bool((signed_areas(points, triangles) > 0.1 * (sides**2).sum(axis=(1, 2)) / 3).all())
+
+
+def _points(side: OutlineSide, span: tuple[float, float], shares: np.ndarray) -> np.ndarray:
+    """Points of a side at shares of the way between two parameters [m], shape (n, 2)."""
+    return np.array([side.at(float(span[0] + share * (span[1] - span[0]))) for share in shares])
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A stretch of the outline that becomes a side of triangles, or some; numbers of the regions beside it."""
+
+    side: OutlineSide
+    span: tuple[float, float]
+    groups: tuple[str, ...]
+    left: int
+    right: int
+
+    def at(self, shares: np.ndarray) -> np.ndarray:
+        return _points(self.side, self.span, shares)
+
+    @property
+    def turn(self) -> float:
+        """Turn of its direction from end to end [rad]."""
+        one, other = (self.side.slope(parameter) for parameter in self.span)
+        return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
+
+    def halves(self) -> "tuple[_Piece, _Piece]":
+        middle = sum(self.span) / 2
+        return replace(self, span=(self.span[0], middle)), replace(self, span=(middle, self.span[1]))
+
+
+def _refine_pieces(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
+    """Pieces that are short where others are near, and turn little."""
+    while True:
+        samples = np.array([piece.at(np.linspace(0, 1, PIECE_SAMPLES)) for piece in pieces])
+        chords = samples[:, -1] - samples[:, 0]
+        lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
+        normal = chords[:, ::-1] * [1, -1] / np.linalg.norm(chords, axis=1)[:, None]
+        sagittas = np.abs(((samples - samples[:, :1]) * normal[:, None]).sum(axis=2)).max(axis=1)
+        tree = spatial.cKDTree(samples.reshape(-1, 2))
+        refined: list[_Piece] = []
+        for piece, at, length, sagitta in zip(pieces, samples, lengths, sagittas):
+            # What is farther than its length does not matter.
+            near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // PIECE_SAMPLES)
+            apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
+            clear = apart > LENGTH_TOLERANCE * extent
+            nearest = apart[clear].min(initial=np.inf)
+            others = (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf)
+            limit = min(extent / LEAST_SIDES_ALONG, ELEMENT_GROWTH * nearest, others)
+            if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
+                refined += piece.halves()
+            else:
+                refined.append(piece)
+        if len(refined) == len(pieces):
+            return pieces
+        pieces = refined
+
+
+def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:
+    """Parameters of the ends of a side and of points on it, and the names of these."""
+    cuts, on_it = {0.0, 1.0}, []
+    for name, point in points.items():
+        parameter, distance = side.nearest(point)
+        if distance <= small:
+            on_it.append(name)
+            if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > small:
+                cuts.add(parameter)
+    return sorted(cuts), on_it
+
+
+def outline_mesh(
+    shape: Shape, grouped: GroupedMesh | None, points: Mapping[str, Point], largest_turn: float = LARGEST_TURN
+) -> CoarseMesh:
+    """Make coarse triangles of a shape by netgen, with corners at `points` and arcs cut every `largest_turn` [rad]."""
+    if grouped is None:
+        names = ("", *shape.parts)
+        numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
+        whole = [
+            _Piece(side, (0.0, 1.0), (side.group,) if side.group else (), numbers[one.inner], numbers[one.outer])
+            for one in shape.rounds
+            for side in one.sides
+        ]
+    else:
+        names, whole = _polygons(grouped)
+    corners = np.array([end for piece in whole for end in (piece.side.start, piece.side.end)])
+    extent = float(np.ptp(corners, axis=0).max())
+    pieces, placed = [], set()
+    for piece in whole:
+        cuts, on_it = _cut(piece.side, points, LENGTH_TOLERANCE * extent)
+        placed.update(on_it)
+        pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
+    mesh = _triangulated(shape.name, _refine_pieces(pieces, extent, largest_turn), names, extent)
+    for name, point in points.items():
+        where = np.array(point, dtype=float)
+        if name in placed:
+            mesh.named[name] = int(np.argmin(np.linalg.norm(mesh.points - where, axis=1)))
+            mesh.points[mesh.named[name]] = where
+    for name, point in points.items():
+        if name not in placed:
+            mesh.insert(name, np.array(point, dtype=float))
+    return mesh
+
+
+def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], extent: float) -> CoarseMesh:
+    """Triangles between pieces of outlines."""
+    ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
+    # Lengths about 1: netgen's own tolerances are absolute.
+    scale, origin = LEAST_SIDES_ALONG / extent, ends.min(axis=(0, 1))
+    keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
+    given = np.empty((len(keys), 2))
+    given[places.ravel()] = ends.reshape(-1, 2)
+    lines = [(int(i), int(j), one.left, one.right) for one, (i, j) in zip(pieces, places.reshape(-1, 2))]
+    remedy = "look for sides that meet or touch"
+    made = triangulate((given - origin) * scale, lines, repr(name), remedy, maxh=1.0, grading=0.5)
+    points = made.points / scale + origin
+    triangles, parts = upright(points, made.triangles), made.regions - 1
+
+    sides = {}
+    exact = points.copy()
+    for line, *corners in made.pieces:
+        piece, (start, end), (first, second) = pieces[line], ends[line], sorted(corners)
+        shares = (points[[first, second]] - start) @ (end - start) / ((end - start) @ (end - start))
+        shares[np.abs(shares) < 1e-7] = 0.0
+        shares[np.abs(shares - 1) < 1e-7] = 1.0
+        exact[[first, second]] = piece.at(shares)
+        span = piece.span[0] + shares * (piece.span[1] - piece.span[0])
+        arc = piece.side if piece.side.arc else None
+        sides[first, second] = Side(piece.groups, arc, (float(span[0]), float(span[1])))
+    return CoarseMesh(exact, triangles, parts, names, sides, {})
+
+
+def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
+    """Names of parts, and straight pieces around and between the parts of a mesh."""
+    mesh = grouped.mesh
+    names = tuple(dict.fromkeys(["", *grouped.parts]))
+    ways, parts, labels = [], [], part_names(grouped)
+    for count, cells in mesh.cells.items():
+        of_cells = np.array([names.index(name) for name in labels[count]])
+        for i in range(count):
+            ways.append(cells[:, [i, (i + 1) % count]])
+            parts.append(of_cells)
+    n = len(mesh.points)
+    way, part = np.concatenate(ways), np.concatenate(parts)
+    codes, twins = way[:, 0] * n + way[:, 1], way[:, 1] * n + way[:, 0]
+    order = np.argsort(codes)
+    found = np.minimum(np.searchsorted(codes[order], twins), len(codes) - 1)
+    other = order[found]
+    outer = codes[other] != twins
+    between = ~outer & (part < part[other])
+    groups: dict[_Ends, tuple[str, ...]] = {}
+    for name, edges in grouped.sides.items():
+        for first, second in np.sort(edges, axis=1).tolist():
+            groups[first, second] = (*groups.get((first, second), ()), name)
+    leaving: dict[int, list[int]] = {}
+    arriving: dict[int, list[int]] = {}
+    keys: dict[int, tuple[tuple[str, ...], int, int]] = {}  # what is beside a way
+    for row in np.flatnonzero(outer | between).tolist():
+        first, second = way[row].tolist()
+        right = 0 if outer[row] else int(part[other[row]]) + 1
+        keys[row] = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
+        leaving.setdefault(first, []).append(row)
+        arriving.setdefault(second, []).append(row)
+    following: dict[int, int] = {}  # where a way goes on straight
+    for here, rows in leaving.items():
+        if len(rows) == len(arriving.get(here, ())) == 1 and keys[rows[0]] == keys[arriving[here][0]]:
+            before, there = way[arriving[here][0], 0], way[rows[0], 1]
+            one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
+            if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT_TURN * (one @ two):
+                following[arriving[here][0]] = rows[0]
+    pieces = []
+    for row in [row for rows in leaving.values() for row in rows if row not in set(following.values())]:
+        last = row
+        while last in following:
+            last = following[last]
+        start, end = (tuple(mesh.points[point].tolist()) for point in (way[row, 0], way[last, 1]))
+        pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *keys[row]))
+    return names, pieces
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Corner of the outline or of parts; `rough` where a solution is not smooth enough for even triangles."""
+
+    what: str
+    rough: bool = True
+    infinite: bool = False
+
+
+def corners_of(
+    mesh: CoarseMesh,
+    condition: Callable[[Side], object],
+    held: Callable[[Side], bool],
+    mirror: Callable[[Side, np.ndarray], bool],
+) -> dict[int, Corner]:
+    """Return the corners where a solution may not be smooth, as re-entrant ones between free sides (Williams 1952)."""
+    at_sides = mesh.part_sides()
+    at_corner: dict[int, list[_Ends]] = {}
+    for ends in at_sides:
+        for end in ends:
+            at_corner.setdefault(end, []).append(ends)
+    inside: dict[int, set[int]] = {}
+    for row, i in zip(*np.nonzero(np.isin(mesh.triangles, list(at_corner)))):
+        inside.setdefault(int(mesh.triangles[row, i]), set()).add(int(mesh.parts[row]))
+
+    def leaving(corner: int, ends: _Ends) -> np.ndarray:
+        """Direction of a side at a corner."""
+        side = mesh.sides[ends]
+        if side.arc is None:
+            other = ends[1] if ends[0] == corner else ends[0]
+            way = mesh.points[other] - mesh.points[corner]
+        else:
+            place = ends.index(corner)
+            way = np.array(side.arc.slope(side.span[place])) * (side.span[1 - place] - side.span[place])
+        return way / np.linalg.norm(way)
+
+    found: dict[int, Corner] = {}
+    for corner, around in at_corner.items():
+        outer = [ends for ends in around if len(at_sides[ends]) == 1]
+        between = [ends for ends in around if len(at_sides[ends]) > 1]
+        if len(inside[corner]) > 1:
+            if outer:
+                found[corner] = Corner("parts of different materials meet on the outline")
+            elif len(between) != 2:
+                found[corner] = Corner("parts meet")
+            else:
+                one, other = (leaving(corner, ends) for ends in between)
+                rough = np.arccos(np.clip(-(one @ other), -1, 1)) > SMOOTH_TURN
+                found[corner] = Corner("parts of different materials meet", bool(rough))
+            continue
+        if len(outer) != 2:
+            if outer:
+                found[corner] = Corner("pieces of the body touch")
+            continue
+        # The side from which the body lies counter-clockwise about the corner, then the other one.
+        leads = at_sides[outer[0]][0][1] == (outer[0][0] == corner)
+        first, last = outer if leads else outer[::-1]
+        one, other = leaving(corner, first), leaving(corner, last)
+        angle = float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other) % (2 * np.pi))
+        sides = mesh.sides[first], mesh.sides[last]
+        same = condition(sides[0]) == condition(sides[1])
+        mirrored = mirror(sides[0], one), mirror(sides[1], other)
+        free = not held(sides[0]), not held(sides[1])
+        bare = not condition(sides[0]), not condition(sides[1])
+        straight = same and abs(angle - np.pi) <= SMALL_TURN
+        if all(mirrored):
+            rough, infinite = abs(angle - np.pi / 2) > SMALL_TURN, angle > np.pi / 2 + SMALL_TURN and not straight
+        elif any(mirrored):
+            smooth = any(bare) and (2 * angle < UNGRADED_ANGLE or abs(2 * angle - np.pi) <= SMOOTH_TURN)
+            rough, infinite = not smooth, any(free) and 2 * angle > np.pi + SMALL_TURN
+        else:
+            rough = not (all(bare) and angle < UNGRADED_ANGLE)
+            infinite = all(free) and angle > np.pi + SMALL_TURN
+        what = "the outline has a corner" if same else "supports or loads change at an angle"
+        rough = rough and not (same and abs(angle - np.pi) <= SMOOTH_TURN)
+        found[corner] = Corner(f"{what} of {np.degrees(angle):.4g} degrees", rough, infinite)
+    return found
 
 
 def function_counts(degree: int) -> tuple[int, int]:
@@ -102,3 +551,88 @@ def side_fit(degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Return inner points of Lobatto's rule on a side, and the matrix from values there to side functions."""
     along = np.real(Legendre.basis(degree).deriv().roots())
     return along, np.linalg.inv(side_functions(degree, along)[0][:, 2:])
+
+
+class Space:
+    """Polynomials of one degree on the triangles of a mesh."""
+
+    def __init__(self, mesh: CoarseMesh, degree: int) -> None:
+        self.mesh, self.degree = mesh, degree
+        self.corners = corners = np.sort(mesh.triangles, axis=1)
+        one, two = (mesh.points[corners[:, i]] - mesh.points[corners[:, 0]] for i in (1, 2))
+        self.sense = np.sign(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+        n_points = len(mesh.points)
+        pairs = np.concatenate([corners[:, pair] for pair in SIDE_CORNERS])
+        codes, places = np.unique(pairs[:, 0] * n_points + pairs[:, 1], return_inverse=True)
+        self.edges = np.stack(np.divmod(codes, n_points), axis=1)
+        of_triangles = places.reshape(3, -1).T
+        per_side, inside = function_counts(degree)
+        self.n_outer = n_points + len(codes) * per_side
+        self.n_functions = self.n_outer + len(corners) * inside
+        on_sides = n_points + of_triangles[:, :, None] * per_side + np.arange(per_side)
+        within = self.n_outer + np.arange(len(corners))[:, None] * inside + np.arange(inside)
+        self.n_local_outer = 3 + 3 * per_side
+        self.numbers = np.concatenate([corners, on_sides.reshape(len(corners), -1), within], axis=1)
+        # Where the triangles are: coefficients of the same functions (isoparametric).
+        self.places = np.zeros((self.n_functions, 2))
+        self.places[:n_points] = mesh.points
+        self.codes = codes
+        along, inverse = side_fit(degree)
+        curved = [ends for ends, side in mesh.sides.items() if side.arc is not None]
+        for ends in curved:
+            start, end = mesh.points[ends[0]], mesh.points[ends[1]]
+            straight = (start + end) / 2 + along[:, None] * (end - start) / 2
+            self.places[self.on_side(ends)[2:]] = inverse @ (mesh.curve(ends, along) - straight)
+        bent = np.zeros(len(codes), dtype=bool)
+        bent[[self._edge(ends) for ends in curved]] = True
+        self.curved = np.asarray(bent[of_triangles].any(axis=1))
+
+    def _edge(self, ends: tuple[int, int]) -> int:
+        return int(np.searchsorted(self.codes, ends[0] * len(self.mesh.points) + ends[1]))
+
+    def on_side(self, ends: tuple[int, int]) -> np.ndarray:
+        """Functions on a side, as in `side_functions`."""
+        per_side = self.degree - 1
+        first = len(self.mesh.points) + self._edge(ends) * per_side
+        return np.concatenate([np.array(ends), np.arange(first, first + per_side)])
+
+    def jacobians(self, gradients: np.ndarray, rows: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of places (n, points, 2, 2), last by reference coordinate, and determinants; refuse folds."""
+        at = self.places[self.numbers[rows]]
+        derivatives = np.einsum("eic,qia->eqca", at, gradients, optimize=True)
+        determinants = derivatives[..., 0, 0] * derivatives[..., 1, 1] - derivatives[..., 0, 1] * derivatives[..., 1, 0]
+        folded = (determinants * self.sense[rows, None] <= 0).any(axis=1)
+        if folded.any():
+            x, y = 1e3 * self.mesh.points[self.corners[rows][folded][0]].mean(axis=0)
+            raise MeshError(f"a triangle folds along an arc near ({x:.4g}, {y:.4g}) mm; give the arc as shorter arcs")
+        return derivatives, determinants
+
+    def side_points(self, ends: tuple[int, int], outwards: float, count: int) -> tuple[np.ndarray, ...]:
+        """Functions, points, outward normals times length, and weights at Gauss points of a side."""
+        along, weights = np.polynomial.legendre.leggauss(count)
+        values, slopes = side_functions(self.degree, along)
+        at = self.places[self.on_side(ends)]
+        tangents = slopes @ at
+        return values, values @ at, outwards * np.stack([tangents[:, 1], -tangents[:, 0]], axis=1), weights
+
+
+def inverse_of(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
+    """Inverses of 2 x 2 matrices, shape (..., 2, 2)."""
+    inverse = np.empty_like(matrices)
+    inverse[..., 0, 0], inverse[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
+    inverse[..., 0, 1], inverse[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
+    return inverse / determinants[..., None, None]
+
+
+def is_unfolded(mesh: CoarseMesh) -> bool:
+    """Whether all triangles are the right way round everywhere."""
+    if not (signed_areas(mesh.points, mesh.triangles) > 0).all():
+        return False
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+    try:
+        for degree in (2, 4):
+            gradients = tabulated(degree, 10)[3], shape_functions(degree, corners)[1]
+            Space(mesh, degree).jacobians(np.concatenate(gradients))
+    except MeshError:
+        return False
+    return True

@@ -160,7 +160,7 @@ class BoundaryProblem(ABC):
         if one.kind == "reaction":
             weights = reaction_weights(self.grouped, self.case, one)
             return float(np.tensordot(self.reactions(springs, network, moved), weights, axes=2))
-        from ..mechanics.stress import cell_stresses, particle_stresses  # here: few ask for stress
+        from ..mechanics.continuum import cell_stresses, particle_stresses  # here: few ask for stress
 
         corners, cell, shares = cell_at(self.grouped, one.of)
         stresses, names = cell_stresses(network, moved, linear), part_names(self.grouped)

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..mechanics.moduli import lateral_forces
+from ..mechanics.continuum import lateral_forces
 from ..mechanics.network import FollowerPressure, Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem

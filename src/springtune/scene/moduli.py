@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..mechanics.moduli import PatchTest
+from ..mechanics.continuum import PatchTest
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, Material
 from ..springs.base import DefinitionError, Springs
@@ -57,7 +57,7 @@ class Moduli:
     def stiffness(self) -> np.ndarray:
         """Stiffness in plane stress [Pa], shape (3, 3), as of `Material.plane_stress`; NaN where loads change it.
 
-        By even strains of the whole outline, see `springtune.mechanics.moduli.PatchTest.stiffness`.
+        By even strains of the whole outline, see `springtune.mechanics.continuum.PatchTest.stiffness`.
         """
         if self.springs.lateral:
             return np.full((3, 3), np.nan)
@@ -102,7 +102,8 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     """Measure the effective moduli of a definition on a mesh, by patch tests with an even strain.
 
     Young's modulus and Poisson's ratio are those of a strip whose ends slide; of other meshes means over all
-    directions, see `springtune.mechanics.moduli`. Rows of triangles that are stretched to fit a box are not isotropic.
+    directions, see `springtune.mechanics.continuum`. Rows of triangles that are stretched to fit a box are not
+    isotropic.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Source: Kot, ChemEngineering 5(1):3, 2021; the solve in the plane is ours (abstract, derived).
     """
-    from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
+    from ..mechanics.continuum import outline_forces  # here: see `springtune.springs`
     from ..mechanics.network import Network
 
     found = lattice.springs(mesh, material, thickness)

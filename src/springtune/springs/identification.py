@@ -34,7 +34,7 @@ class Case:
 
 def tested_body(mesh: Mesh) -> np.ndarray:
     """Directions to hold of the free body of a patch test, shape (n_points, 2); refuse a mesh of several parts."""
-    from ..mechanics.moduli import free_body  # here: see `springtune.springs`
+    from ..mechanics.continuum import free_body  # here: see `springtune.springs`
 
     try:
         return free_body(mesh)
@@ -44,7 +44,7 @@ def tested_body(mesh: Mesh) -> np.ndarray:
 
 def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Case]:
     """Return tension along x and y and shear of the free mesh under even tractions; exact displacements are known."""
-    from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
+    from ..mechanics.continuum import outline_forces  # here: see `springtune.springs`
 
     tested_body(mesh)
     x, y = mesh.points.T

@@ -38,7 +38,7 @@ def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 
 def _scaled(found: Springs, mesh: Mesh, material: Material, thickness: float) -> Springs:
-    from ..mechanics.moduli import PatchTest  # here: see `springtune.springs`
+    from ..mechanics.continuum import PatchTest  # here: see `springtune.springs`
 
     # The modulus in units of the reference stiffness: the scalar is a ratio of the two.
     stiffness, _ = PatchTest(mesh).axial(found)

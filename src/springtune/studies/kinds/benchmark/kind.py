@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from springtune.mechanics.integrators import PRECISIONS
+from springtune.mechanics import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import nearest

@@ -10,7 +10,7 @@ from itertools import chain, product
 
 import numpy as np
 
-from springtune.mechanics.integrators import PRECISIONS
+from springtune.mechanics import PRECISIONS
 from springtune.mechanics.stepping import make_stepper
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.compare import assured, deformation_error

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from springtune.mechanics.integrators import PRECISIONS
+from springtune.mechanics import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.registry import import_name

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from springtune.mechanics.integrators import INTEGRATORS
+from springtune.mechanics import INTEGRATORS
 
 EXPERIMENTS = {
     "limits": "largest stable time step",

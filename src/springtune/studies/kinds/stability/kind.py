@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from springtune.mechanics.integrators import BEHAVIOURS
+from springtune.mechanics import BEHAVIOURS
 from springtune.mesh.types import MESH_TYPES
 
 from ...config import fields

@@ -8,11 +8,11 @@ from itertools import product
 
 import numpy as np
 
+from springtune.mechanics import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
 from springtune.mechanics.continuation import buckling as critical_load
 from springtune.mechanics.continuation import follow
+from springtune.mechanics.continuum import PatchTest
 from springtune.mechanics.dynamics import Motion, relax
-from springtune.mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
-from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.statics import SingularError, StaticProblem
 from springtune.mesh.cells import Mesh, corner_angles
 from springtune.mesh.types import MESH_TYPES
