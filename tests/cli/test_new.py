@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import springtune as st
-from springtune.cli.run import SLURM
+from springtune.cli.study import SLURM
 
 from campaigns import Campaign
 from tables import run

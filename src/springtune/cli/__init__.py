@@ -31,15 +31,15 @@ class WrongCall(click.ClickException):
 
 COMMANDS = {
     "new": ("study", "Write a small study to begin with."),
-    "run": ("run", "Run a study."),
+    "run": ("study", "Run a study."),
     "scenes": ("study", "List a study's scenes and what they share, without running it."),
     "definitions": ("study", "List the definitions of spring stiffness."),
     "predict": ("predict", "Recommend a definition for one mesh, or a mesh for one error."),
-    "identify": ("identify", "Find a material's constants from measured tests."),
+    "identify": ("predict", "Find a material's constants from measured tests."),
     "springs": ("predict", "Write the springs of one mesh for another program."),
     "browse": ("results", "Open the page of a study in a browser."),
     "info": ("results", "Show what a dataset holds, and where it comes from."),
-    "diff": ("diff", "List the values that differ between two datasets."),
+    "diff": ("results", "List the values that differ between two datasets."),
     "export": ("results", "Write a group of a dataset as CSV or Parquet."),
     "archive": ("results", "Pack the results of a study into one file."),
     "docs": ("results", "Print where the pages, the manual of studies and the examples are."),

@@ -1,15 +1,27 @@
-"""Commands for results: info, export, browse and archive."""
+"""Commands for results: info, diff, export, browse, archive and docs."""
 
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..registry import how_to_install
+from ..safe_io.escapes import clipped, shown
 from ..safe_io.tables import aligned
-from ..studies.output.text import bytes_text
+from ..studies.output.text import bytes_text, cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER, workflow_folder
-from . import examples
+from . import WrongCall, examples
+
+if TYPE_CHECKING:
+    from ..studies.output.comparison import Change, Comparison, GroupChanges
+
+ROWS = 20
+"""Rows of a table."""
+
+COMPARED = ("before", "after")
 
 
 @click.command(epilog=examples("springtune info results/paper", "springtune info dataset.nc --study > again.yaml"))
@@ -101,3 +113,156 @@ def docs() -> None:
     """Print where the pages, the manual of studies and the examples are."""
     places = {"pages": "docs/README.md", "keys of a study": "config/README.md", "examples": "examples"}
     click.echo(aligned(((what, workflow_folder() / place) for what, place in places.items()), left=0))
+
+
+# -- diff --------------------------------------------------------------------------------------------------------------
+
+
+@click.command(
+    epilog=examples(
+        "springtune diff results/before results/mine",
+        "springtune diff before.nc results/mine --relative 1e-3 --group sensitivity",
+    )
+)
+@click.argument("before")
+@click.argument("after")
+@click.option(
+    "--relative", type=click.FloatRange(0), default=1e-6, show_default=True, help="Tolerance of the larger number."
+)
+@click.option(
+    "--absolute", type=click.FloatRange(0), help="Tolerance in SI units.  [default: 0; without unit, --relative]"
+)
+@click.option("--group", "groups", multiple=True, help="Group to compare, such as sensitivity; all without.")
+@click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
+@click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
+def diff(
+    before: str,
+    after: str,
+    relative: float,
+    absolute: float | None,
+    groups: tuple[str, ...],
+    ignored: tuple[str, ...],
+    rows: int,
+) -> None:
+    """List the values that differ between two datasets by more than a tolerance.
+
+    BEFORE and AFTER are results/<study>, or its dataset.nc. Scenes are matched by their labels. Numbers are equal
+    within --relative or --absolute, and NaN equals NaN. Along a curve or over a field, --relative is of the largest
+    number. Run times and other measurements of the machine are not compared. Versions and studies are printed, and
+    are no difference.
+
+    Exit codes: 0 nothing changed, 1 something changed, 2 nothing could be compared.
+    """
+    from ..studies.output import reading
+    from ..studies.output.comparison import Tolerance, compare
+
+    try:
+        paths = [reading.dataset_file(before), reading.dataset_file(after)]
+        with reading.open(paths[0]) as one, reading.open(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
+            given = Tolerance(relative, absolute)
+            found = compare(one, other, given, groups, ignored, rows)
+            click.echo(comparison_text(found, paths, rows))
+    except (OSError, ValueError) as error:
+        raise WrongCall(shown(error)) from None
+    if found.different:
+        raise click.exceptions.Exit(1)
+
+
+def comparison_text(found: "Comparison", paths: Sequence[Path], most: int = ROWS) -> str:
+    """Comparison as text."""
+    groups = {group.name: group for group in found.groups}
+    changed = [(group.name, one) for group in found.groups for one in (*group.flags, *group.values) if one.changed]
+    parts = [[f"{f'{side}:':7} {path}" for side, path in zip(COMPARED, paths)]]
+    parts[0].append(_summary(found, sum(one.changed for _, one in changed)))
+    parts += [part for group in found.groups for part in _alone(group, most)]
+    if changed:
+        counts = [["  variable", "cells", "changed", "largest change"]]
+        for name, one in changed:
+            largest = next((row for row in one.rows if math.isfinite(row.difference)), one.rows[0])
+            counts.append(
+                [f"  {variable_name(name, one.name)}", str(one.compared), str(one.changed), _difference(largest)]
+            )
+        flags = [row for group in found.groups for one in group.flags for row in one.rows]
+        rows = [
+            [
+                f"  {variable_name(row.group, row.variable)}",
+                *(_value(row.before), _value(row.after), _difference(row)),
+                _place(groups[row.group], row.labels),
+            ]
+            for row in [*flags[:most], *found.changes[:most]]
+        ]
+        parts.append(["values that changed", *aligned(counts, 0, (1, 2)).splitlines()])
+        table = aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines()
+        more = _more(sum(one.changed for _, one in changed) - len(rows))
+        parts.append(["the largest changes, measured by the tolerance", *table, *more])
+    if found.attributes:
+        told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
+        parts.append(["attributes that differ; they are no results", *aligned(told, 0).splitlines()])
+    return paragraphs(parts)
+
+
+def _summary(found: "Comparison", changed: int) -> str:
+    """Summary in one line."""
+    groups = found.groups
+    said = [f"group {path} only {side}" for side, own in zip(COMPARED, found.alone) for path in own]
+    for number, side in enumerate(COMPARED):
+        said += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
+    unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in groups)
+    said += [f"{changed} values changed"] if changed else []
+    said += [f"{unlike} variables are only in one, or cannot be compared"] if unlike else []
+    result = f"different: {', '.join(said) or 'labels'};" if found.different else "the same:"
+    return f"{result} {sum(one.compared for group in groups for one in (*group.flags, *group.values))} values compared"
+
+
+def _cells(group: str) -> str:
+    return "scenes" if group == "/" else f"cells of {group}"
+
+
+def _alone(group: "GroupChanges", most: int) -> Iterator[list[str]]:
+    """Paragraphs on labels, cells and variables of a group that only one dataset has."""
+    labels = []
+    for name, both in group.labels.items():
+        for side, own in zip(COMPARED, both):
+            said = ", ".join(_place(group, {name: label}) for label in own[:most])
+            more = f", and {len(own) - most} more" if len(own) > most else ""
+            labels += [f"  {name} only {side}: {said}{more}"] if own else []
+    if labels:
+        yield [f"labels of {group.name}", *labels]
+    for side, alone in zip(COMPARED, group.cells):
+        if alone.count:
+            lines = [f"  {_place(group, one)}" for one in alone.rows]
+            yield [f"{_cells(group.name)} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
+    variables = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
+    if variables or group.unlike:
+        yield [f"variables of {group.name}", *variables, *(f"  {name} {why}" for name, why in group.unlike.items())]
+
+
+def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
+    """Labels of dimensions with several labels, for readers."""
+    return cell_text({name: label for name, label in labels.items() if group.sizes[name] > 1}, group.units)
+
+
+def _short(text: str) -> str:
+    return clipped(" ".join(text.split()) or "none")
+
+
+def _more(count: int) -> list[str]:
+    """Line on rows that are left out, if any."""
+    return [f"  and {count} more; --rows shows them"] if count > 0 else []
+
+
+def _value(value: float | str) -> str:
+    if isinstance(value, str):
+        return _short(value) if value else "nothing"
+    return "nothing" if math.isnan(value) else f"{value:.9g}"
+
+
+def _difference(row: "Change") -> str:
+    """Difference with unit, and as a share of the former number."""
+    number = row.difference
+    if not math.isfinite(number):
+        return "gone" if row.after == "" or row.after != row.after else "new" if row.before != row.before else ""
+    units = "" if row.units in ("", "1") else f" {row.units}"
+    before = float(row.before)
+    share = f" ({100 * number / abs(before):+.2g} %)" if before and units else ""
+    return f"{number:+.3g}{units}{share}"

@@ -1,19 +1,25 @@
-"""Commands for studies: new, scenes and definitions."""
+"""Commands for studies: new, scenes, run and definitions."""
 
+import gc
 import os
+import subprocess
+import sys
+import warnings
 from collections import Counter
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
 import click
 
+from ..problem.geometry import AssumptionWarning
 from ..problem.quantities import nearest
-from ..registry import NAME, NAME_RULE
+from ..registry import NAME, NAME_RULE, how_to_install
 from ..safe_io.atomic import write_bytes, write_text
 from ..safe_io.tables import aligned
-from ..studies.runs.source import CONFIG_FOLDER, TASKS, config_file, is_source_tree, workflow_folder
+from ..studies.runs.source import CONFIG_FOLDER, TASKS, USUAL_STUDY, config_file, is_source_tree, workflow_folder
 from . import WrongCall, examples
 
 if TYPE_CHECKING:
@@ -171,3 +177,193 @@ def definitions() -> None:
         for name, one in DEFINITIONS.items()
     ]
     click.echo(aligned(rows, left=2))
+
+
+# -- run ---------------------------------------------------------------------------------------------------------------
+
+
+@click.command(
+    epilog=examples(
+        "springtune run config/mine.yaml",
+        "springtune run config/mine.yaml --cores 4",
+        "springtune run config/mine.yaml -n",
+        "springtune run config/mine.yaml --workflow-profile slurm",
+    ),
+    context_settings={"ignore_unknown_options": True},
+    options_metavar="[--results FOLDER]",
+)
+@click.option(
+    "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
+)
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
+def run(results: Path | None, arguments: tuple[str, ...]) -> None:
+    """Run a study; without a name, the paper's.
+
+    Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All other options are
+    Snakemake's. Exit codes: 0 all is made, also if scenes could not be solved; 1 the study is wrong or a job failed; 2
+    wrong options.
+    """
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study  # here, so that --help does not wait for it
+    from ..studies.runs.rerun import PAPER_STUDIES
+
+    gc.disable()  # scenes and their tasks stay to the end: collecting garbage among them takes a sixth of the time
+    named = bool(arguments) and not arguments[0].startswith("-")
+    options = [*arguments[named:]]
+    if {"--configfile", "--configfiles"} & {one.partition("=")[0] for one in options}:
+        raise click.UsageError("give the study itself, without --configfile: springtune run mine.yaml")
+    late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
+    if late:
+        first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
+        raise click.UsageError(f"name the study first: springtune run {first}")
+    if _wants_slurm(options) and not find_spec(SLURM):
+        why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
+        raise click.UsageError(f"{why}; {how_to_install('slurm')}")
+    shown = Path(arguments[0]) if named else config_file(USUAL_STUDY)
+    path = shown.absolute()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
+            study = load_study(shown)
+    except StudyError as error:
+        click.echo(str(error) + _suggestion(shown), err=True)
+        raise SystemExit(1) from None
+    folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
+    if results and folder != Path.cwd():
+        click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
+    path = path.relative_to(folder) if path.is_relative_to(folder) else path
+    workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
+    forced: list[str] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.chdir(folder)
+    except OSError as error:
+        why = f"{error.strerror}; name a folder that can be written"
+        raise click.ClickException(f"--results {folder}: {why}") from None
+    set_cache()
+    if _computes(options) or _is_dry_run(options):
+        study = study if path == shown else load_study(path)  # its files are seen from here
+        others = [name for name in PAPER_STUDIES if name != study.name] if "paper" in options else []
+        studies = [study, *(load_study(config_file(f"{name}.yaml", path.parent)) for name in others)]
+    if _is_dry_run(options):
+        # A dry run removes no records. An option of the user's, which comes later, replaces this one.
+        outdated = _outdated(studies, "a run makes it again")
+        forced = ["--forcerun", *map(str, outdated)] if outdated else []
+    elif _computes(options):
+        _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
+        found = _outdated(studies, "it is made again")
+        for record in found or {}:
+            record.unlink()
+        if found == {} and _asks_for_all(options):
+            from ..studies.output.summary import reminder
+
+            click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
+            return
+    # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
+    # begins with - is not an option behind =.
+    command = [*_snakemake(), *forced, *workflow, *options, f"--configfile={path}"]
+    os.execv(command[0], command)
+
+
+def set_cache() -> None:
+    """Set a cache folder here for Snakemake if the user's cannot be written."""
+    usual = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    try:
+        usual.mkdir(parents=True, exist_ok=True)
+        written = os.access(usual, os.W_OK)
+    except OSError:
+        written = False
+    if not written:
+        os.environ["XDG_CACHE_HOME"] = str(Path(".snakemake/cache").absolute())
+        click.echo(f"note: {usual} cannot be written; .snakemake/cache stands in for it", err=True)
+
+
+READ_ONLY_OPTIONS = {
+    "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--dry-run", "--dryrun", "--filegraph",
+    "--lc", "--li", "--lint", "--list", "--list-changes", "--list-code-changes", "--list-input-changes",
+    "--list-params-changes", "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp",
+    "--lt", "--lu", "--report", "--rulegraph", "--summary", "--unlock", "-D", "-S", "-l", "-n", "-np",
+}  # fmt: skip
+"""Options of Snakemake that compute nothing."""
+
+
+def _computes(options: list[str]) -> bool:
+    """Return whether Snakemake computes anything with these options."""
+    return not any(one.partition("=")[0] in READ_ONLY_OPTIONS for one in options)
+
+
+OPTION_VALUE_COUNTS = {"--cores": 1, "-c": 1, "--jobs": 1, "-j": 1, "--quiet": 0, "-q": 0, "--keep-going": 0, "-k": 0}
+"""Number of values of the options that do not change the products of a run."""
+
+
+def _asks_for_all(options: list[str]) -> bool:
+    """Return whether the options request the whole study and force nothing."""
+    rest = options
+    while rest and rest[0].partition("=")[0] in OPTION_VALUE_COUNTS:
+        rest = rest[1 + (OPTION_VALUE_COUNTS[rest[0]] if "=" not in rest[0] else 0) :]
+    return not rest
+
+
+def _is_dry_run(options: list[str]) -> bool:
+    """Return whether the run is a dry run."""
+    return not {"-n", "-np", "--dry-run", "--dryrun"}.isdisjoint(options)
+
+
+def _results(study: "Study") -> Path:
+    return Path("results") / study.name
+
+
+def _unlock(studies: "list[Study]", command: list[str]) -> None:
+    """Remove the lock of a killed run; refuse a study under computation, a read-only folder and a full disk."""
+    from ..studies.runs import locks
+
+    here = Path.cwd()
+    state = Path(".snakemake")
+    if not os.access(state if state.exists() else here, os.W_OK):
+        remedy = "`springtune info` and `browse` write nothing: call these"
+        raise click.ClickException(f"{here} cannot be written; {remedy}")
+    disk = os.statvfs(here)
+    if disk.f_blocks and not disk.f_bavail:
+        raise click.ClickException(f"{here}: the disk is full; make room, then call the same command again")
+    killed = [one.name for one in studies if locks.check_idle(_results(one))]
+    if killed:
+        subprocess.run(command, check=False, capture_output=True)
+        which = ", ".join(str(Path("results", name)) for name in killed)
+        click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
+
+
+def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
+    """Records of outdated jobs, with the reasons; None if a job was never done. Missing files are printed."""
+    from ..studies.runs import rerun
+
+    each = [rerun.outdated(study, _results(study)) for study in studies]
+    found = {record: why for one in each for record, why in (one or {}).items()}
+    for why in filter(rerun.is_missing, found.values()):
+        click.echo(f"{why}; {remedy}", err=True)
+    return found if found or None not in each else None
+
+
+SLURM = "snakemake_executor_plugin_slurm"
+"""Package of the plugin; without it Snakemake only reports unknown options of the profile."""
+
+
+def _wants_slurm(options: list[str]) -> bool:
+    """Return whether the options name the profile for Slurm."""
+    named = [two for one, two in zip(options, options[1:]) if one == "--workflow-profile"]
+    named += [one.partition("=")[2] for one in options if one.startswith("--workflow-profile=")]
+    return any(Path(one).name == "slurm" for one in named)
+
+
+def _suggestion(path: Path) -> str:
+    """Suggestion of an existing study for a missing one, or an empty string."""
+    near = config_file(f"{path.stem}.yaml")
+    if path.exists() or near == path or not near.is_file():
+        return ""
+    copied = f"`springtune new {path.stem} --from {path.stem}` writes it here"
+    return f"; {copied}" if near.is_absolute() else f"; did you mean {near}?"
+
+
+def _snakemake() -> list[str]:
+    """Command of Snakemake on this Python."""
+    beside = Path(sys.executable).with_name("snakemake")
+    return [str(beside)] if beside.exists() else [sys.executable, "-m", "snakemake"]

@@ -23,9 +23,18 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
 from ..registry import hook
 from ..safe_io.tables import Tabled
-from ..scene.boundary_problem import BeamProblem, ShapeProblem
-from ..scene.mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, naming_errors
-from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
+from ..scene.boundary_problem import BeamProblem, ShapeProblem, check_filled
+from ..scene.mesh_cache import (
+    A_BEAM,
+    A_MATERIAL,
+    A_MESH,
+    AnyDefinition,
+    MeshCache,
+    check_stiffness,
+    definition_of,
+    is_a,
+    naming_errors,
+)
 from ..scene.motion import stable_steps
 from ..scene.single import Scene
 from ..springs.base import Definition, DefinitionError, Springs

@@ -22,8 +22,7 @@ from ..problem.status import Status
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
-from ..scene.mesh_cache import MeshCache, choose
-from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
+from ..scene.mesh_cache import A_BEAM, A_MATERIAL, A_MESH, MeshCache, choose, is_a
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 

@@ -26,7 +26,7 @@ from ..problem.quantities import quantity
 from ..problem.shapes import Shape
 from ..safe_io.tables import Tabled, mesh_size_text
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
-from ..scene.meshes import A_MATERIAL, is_a
+from ..scene.mesh_cache import A_MATERIAL, is_a
 from .choices import (
     SEARCHED_PARTICLES,
     USUAL_LOADS,

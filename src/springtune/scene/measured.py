@@ -17,8 +17,7 @@ from ..problem.rubber import TestDataError
 from ..problem.shapes import LoadCase, Segment, Shape
 from ..reference.by_constants import Family
 from ..safe_io.inputs import csv_rows, number_of, numbers
-from .mesh_cache import choose
-from .meshes import A_BEAM, is_a
+from .mesh_cache import A_BEAM, choose, is_a
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")
 """Columns of a field, and those that a curve has at least."""

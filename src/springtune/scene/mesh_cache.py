@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from math import inf
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ..mesh.groups import GroupedMesh
 from ..problem.boundary import held, loaded_box, measured, side_edges, weights
 from ..problem.geometry import Beam
 from ..problem.loads import LoadKind
-from ..problem.materials import AnyMaterial
+from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
 from ..problem.quantities import nearest
 from ..problem.status import Status
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
@@ -29,6 +29,14 @@ from ..springs.identification import Case, patch_cases
 NETWORKS_KEPT = 6
 """Factorized networks of a mesh that are kept; few are enough for scenes in order."""
 
+
+A_BEAM, A_SHAPE, A_MESH, A_MATERIAL = (
+    "springtune.Beam('200 mm', '40 mm')",
+    "springtune.Shape.rectangle('200 mm', '40 mm')",
+    "springtune.make_mesh(beam, 'structured', '5 mm')",
+    "springtune.Material('210 GPa', 0.3)",
+)
+"""Calls that make arguments, for messages."""
 
 AnyDefinition = str | Definition | Callable[..., Springs]
 """Definition, its name, or a function (mesh, material, thickness) -> Springs."""
@@ -51,6 +59,15 @@ def choose(known: Mapping[str, Entry], name: object, what: str) -> Entry:
     if isinstance(name, str) and name in known:
         return known[name]
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
+
+
+def is_a(value: object, wanted: Any, name: str, example: str) -> None:
+    """Refuse an argument of another type."""
+    if wanted is Material and isinstance(value, AnisotropicMaterial):
+        only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
+    if not isinstance(value, wanted):
+        first, *_ = get_args(wanted) or [wanted]
+        raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
 
 
 def check_stiffness(definition: Definition, stiffness: object) -> None:

@@ -1,54 +1,18 @@
-"""Meshes of beams: made, or from a file."""
+"""Meshes of beams and shapes: made, or from a file."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
-
-import numpy as np
 
 from ..mesh.cells import Mesh
 from ..mesh.formats import read_beam_mesh
-from ..mesh.sheets import box_fault
+from ..mesh.formats import read_shape as read_grouped
+from ..mesh.groups import GroupedMesh
+from ..mesh.outlines import mesh_shape as mesh_outlined
 from ..mesh.types import MESH_TYPES
 from ..problem.geometry import Beam
-from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive
-from .mesh_cache import choose
-
-MOST_GAP = 1e-6
-"""Largest gap between a mesh and its beam, over the beam's extent."""
-
-
-def is_a(value: object, wanted: Any, name: str, example: str) -> None:
-    """Refuse an argument of another type."""
-    if wanted is Material and isinstance(value, AnisotropicMaterial):
-        only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
-    if not isinstance(value, wanted):
-        first, *_ = get_args(wanted) or [wanted]
-        raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
-
-
-A_SHAPE = "springtune.Shape.rectangle('200 mm', '40 mm')"
-"""Call that makes a shape, for messages."""
-
-A_BEAM, A_MESH, A_MATERIAL = (
-    "springtune.Beam('200 mm', '40 mm')",
-    "springtune.make_mesh(beam, 'structured', '5 mm')",
-    "springtune.Material('210 GPa', 0.3)",
-)
-"""Calls that make arguments, for messages."""
-
-
-def check_filled(mesh: Mesh, beam: Beam) -> None:
-    """Refuse a mesh that does not fill its beam exactly once, as its reference does."""
-    low, high, box = mesh.points.min(axis=0), mesh.points.max(axis=0), np.array([beam.length, beam.height])
-    remedy = "make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
-    if np.abs(np.concatenate([low, high - box])).max() > MOST_GAP * box.max():
-        shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
-        wanted = " x ".join(f"{side:.6g}" for side in 1e3 * box)
-        raise ValueError(f"mesh: extends over {shown} mm, its beam over {wanted} mm from the origin; {remedy}")
-    wrong = box_fault(mesh)
-    if wrong:
-        raise ValueError(f"mesh: does not fill its beam: {wrong}; or {remedy}")
+from ..problem.shapes import Shape
+from .mesh_cache import A_BEAM, A_SHAPE, choose, is_a
 
 
 def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
@@ -112,3 +76,59 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     """
     is_a(beam, Beam, "beam", A_BEAM)
     return read_beam_mesh(path, beam.length, beam.height, positive(unit, "length", "unit"))
+
+
+def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | str] | None = None) -> GroupedMesh:
+    """Mesh a shape, with the groups of its sides, its points and parts.
+
+    An arc has at least six edges a full turn; near much shorter ones, edges are divided further.
+
+    Parameters
+    ----------
+    shape : Shape
+    size : float or str
+        Length of an edge [m], or a text with its unit.
+    refined : mapping of str to float or str, optional
+        Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
+
+    Returns
+    -------
+    GroupedMesh
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+    >>> grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "1 mm"})
+    >>> len(grouped.sides["hole"]), len(grouped.sides["right"])
+    (52, 10)
+    """
+    is_a(shape, Shape, "shape", A_SHAPE)
+    sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
+    return mesh_outlined(shape, positive(size, "length", "mesh size"), sizes)
+
+
+def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
+    """Read the mesh of a shape with its groups, of any format that meshio knows.
+
+    Parameters
+    ----------
+    path : str or Path
+        The guide on mesh files says how a group of the file becomes sides, a point or a part.
+    unit : float or str, optional
+        Unit of the coordinates in the file [m], or a text such as ``"1 mm"``.
+
+    Returns
+    -------
+    GroupedMesh
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> from springtune.mesh import write_mesh
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+    >>> write_mesh("plate.vtu", st.mesh_shape(plate, "4 mm"))
+    >>> sorted(st.read_shape("plate.vtu").sides)
+    ['hole', 'left', 'lower', 'right', 'upper']
+    """
+    return read_grouped(path, positive(unit, "length", "unit"))

@@ -2,7 +2,7 @@
 
 from springtune.problem.materials import InPlane, Material
 from springtune.problem.status import Status
-from springtune.scene.moduli import MeshModuli
+from springtune.scene.sheet import MeshModuli
 from springtune.springs.base import DefinitionError
 
 from ..bodies.stored import make_beam
