@@ -11,7 +11,7 @@ import numpy as np
 import springtune as st
 from springtune.mechanics.continuum import unit_fields, work_of
 from springtune.mechanics.network import Network
-from springtune.mesh import braced, lattice
+from springtune.mesh.rows import braced, lattice
 from springtune.springs import DefinitionError
 
 FIT = st.DEFINITIONS["energy-fit"]

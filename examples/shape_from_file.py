@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import springtune as st
-from springtune.mesh import write_mesh
+from springtune.mesh.formats import write_mesh
 
 
 def mesher(path, inner, outer):

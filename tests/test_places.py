@@ -31,7 +31,7 @@ STUDY = STUDIES["places"]
 REPORT = """
 import json, sys
 from springtune.studies.runs import keys
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.springs import DEFINITIONS
 import springtune as st
 found = {

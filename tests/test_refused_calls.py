@@ -12,7 +12,7 @@ import yaml
 
 import springtune as st
 from counting import counted
-from springtune.mesh.types import MeshType
+from springtune.mesh.cells import MeshType
 from springtune.scene.boundary_problem import unit_reference
 from springtune.scene.mesh_cache import MeshCache
 
@@ -41,7 +41,7 @@ ROWS = [
 ]
 
 
-@pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.filterwarnings("ignore::springtune.problem.shapes.AssumptionWarning")
 @pytest.mark.parametrize(("section", "code", "said", "one"), ROWS)
 def test_a_call_is_refused(section, code, said, one, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

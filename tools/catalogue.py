@@ -15,12 +15,11 @@ from pathlib import Path
 import numpy as np
 
 import springtune as st
-from springtune.handover.simulation import ENERGY_WORDS
-from springtune.handover.terms import terms_of
+from springtune.handover.simulation import ENERGY_WORDS, terms_of
 from springtune.linalg.factors import SingularError
-from springtune.mesh import lattice
+from springtune.mesh.rows import lattice
 from springtune.mesh.sheets import bonded
-from springtune.safe_io.atomic import write_text
+from springtune.safe_io.files import write_text
 from springtune.springs import DEFINITIONS, Definition, Springs
 from springtune.springs.calibrated import calibrate
 

@@ -64,7 +64,7 @@ def unstable(size: float) -> dict[str, object]:
 
     from springtune.mechanics.network import Network
     from springtune.mechanics.statics import StaticProblem
-    from springtune.mesh import MESH_TYPES
+    from springtune.mesh.cells import MESH_TYPES
 
     mesh = MESH_TYPES["structured"](0.2, 0.02, size)
     x = mesh.points[:, 0]

@@ -104,7 +104,7 @@ def plan_and_note(config: str) -> None:
 
 def do_stages(config: str, invent: str) -> None:
     """Do the jobs of a study's stages; results of scenes are invented where that is said."""
-    from springtune.safe_io import atomic
+    from springtune.safe_io.files import write_json
     from springtune.studies.runs import job
 
     folder = Path("results") / Path(config).stem
@@ -116,7 +116,7 @@ def do_stages(config: str, invent: str) -> None:
             note = json.loads(tasks.read_bytes())
             for family in note["content"]["files"]:
                 write_invented(Path(note["content"]["folder"]) / f"{family['name']}.h5", family["tasks"])
-            atomic.write_json(done, {"digest": digest, "computed": len(note["content"]["files"])})
+            write_json(done, {"digest": digest, "computed": len(note["content"]["files"])})
         else:
             job.main(str(tasks), str(done), digest, config)
         spent += sum(os.times()[:4]) - begin if stage == "solve" else 0.0

@@ -15,7 +15,7 @@ import springtune as st
 from springtune.cli import COMMANDS, main
 from springtune.handover.formats import NET_FORMATS
 from springtune.prediction import choices as of_one_mesh
-from springtune.problem.geometry import AssumptionWarning
+from springtune.problem.shapes import AssumptionWarning
 from springtune.studies.config.sections import schema_text
 
 from tables import STUDIES, cases, run
@@ -39,7 +39,7 @@ def completed(words, number):
     return result.output.splitlines()
 
 
-@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.filterwarnings("default::springtune.problem.shapes.AssumptionWarning")
 class TestAssumptions:
     """A beam 1 km thick and one of 200 m were taken without a word."""
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.mesh import write_mesh
+from springtune.mesh.formats import write_mesh
 from springtune.problem.compare import error_text
 
 from tables import STUDIES, run

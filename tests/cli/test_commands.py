@@ -13,8 +13,8 @@ import yaml
 import springtune as st
 from counting import counted
 from springtune.cli.study import template_text
-from springtune.mesh import write_mesh
-from springtune.mesh.types import MeshType
+from springtune.mesh.cells import MeshType
+from springtune.mesh.formats import write_mesh
 from springtune.scene.boundary_problem import unit_reference
 from springtune.scene.mesh_cache import MeshCache
 
@@ -80,14 +80,14 @@ def missing(said, output):
     return [part for part in said if part not in output + lines and not re.search(part, output)]
 
 
-@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.filterwarnings("default::springtune.problem.shapes.AssumptionWarning")
 @pytest.mark.parametrize(("call", "said"), [pytest.param(call, said, id=call) for call, *said in ANSWERED])
 def test_a_call_is_answered(call, said, files):
     result = run(*shlex.split(call))
     assert result.exit_code == 0 and not missing(said, result.output), result.output
 
 
-@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.filterwarnings("default::springtune.problem.shapes.AssumptionWarning")
 @pytest.mark.parametrize(("section", "call", "code", "said"), [*cases()])
 def test_a_call_is_refused(section, call, code, said, files):
     work = (MeshType.__call__, unit_reference, MeshCache.__init__)

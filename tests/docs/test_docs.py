@@ -21,7 +21,7 @@ from packaging.requirements import Requirement
 
 import springtune as st
 from springtune.cli import main
-from springtune.mesh import write_mesh
+from springtune.mesh.formats import write_mesh
 from springtune.studies.config.kind import outputs
 
 from campaigns import Campaign

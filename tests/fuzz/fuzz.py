@@ -32,10 +32,10 @@ import yaml
 
 import springtune as st
 from springtune.mechanics.continuum import PatchTest
-from springtune.mesh import corner_angles, read_beam_mesh, signed_areas, write_mesh
-from springtune.mesh.formats import read_shape
+from springtune.mesh.cells import corner_angles, signed_areas
+from springtune.mesh.formats import read_beam_mesh, read_shape, write_mesh
 from springtune.mesh.sheets import sheet_fault
-from springtune.problem.geometry import AssumptionWarning
+from springtune.problem.shapes import AssumptionWarning
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.bodies.kind import summary
 

@@ -10,7 +10,7 @@ import pytest
 import springtune as st
 from mechanics import spring_forces
 from springtune.handover.simulation import STABLE_STEP_SHARE, EquilibriumWarning
-from springtune.mesh import signed_areas
+from springtune.mesh.cells import signed_areas
 
 from problems import asked, pulled
 from tables import cases

@@ -10,9 +10,9 @@ from netgen.meshing import MeshingParameters
 import springtune as st
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, oriented_outline
 from springtune.mechanics.network import Network
-from springtune.mesh import signed_areas
+from springtune.mesh.cells import signed_areas
 from springtune.problem.compare import band
-from springtune.problem.geometry import Strip, Trapezoid
+from springtune.problem.shapes import Strip, Trapezoid
 from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
 from springtune.studies.kinds.laying.solve import lay
 

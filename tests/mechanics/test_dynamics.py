@@ -13,7 +13,7 @@ from springtune.mechanics.continuum import ends
 from springtune.mechanics.dynamics import Motion, masses, relax
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import lattice
+from springtune.mesh.rows import lattice
 from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL, BENDING
 from springtune.springs.lattice import uniform

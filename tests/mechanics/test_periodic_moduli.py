@@ -11,7 +11,7 @@ from periodic import affine_stiffness, periodic_delaunay, periodic_stiffness
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.continuum import PatchTest, free_body, mean_gradient, outline_forces
 from springtune.mechanics.network import Network
-from springtune.mesh import signed_areas
+from springtune.mesh.cells import signed_areas
 
 LATTICE = 3**0.5 / 4, 3**0.5 / 2
 """Shear and area modulus over k of the equilateral lattice: 0.433 and 0.866."""

@@ -10,9 +10,11 @@ from hypothesis import strategies as some
 from scipy.spatial import Delaunay
 
 import springtune as st
-from springtune import mesh as meshes
-from springtune.mesh import braced, free, lattice, read_beam_mesh, structured, write_mesh
-from springtune.safe_io.inputs import virtual_memory
+from springtune.mesh.cells import quality, signed_areas
+from springtune.mesh.formats import read_beam_mesh, read_mesh, write_mesh
+from springtune.mesh.free import free
+from springtune.mesh.rows import braced, isosceles, lattice, structured
+from springtune.safe_io.files import virtual_memory
 from springtune.studies.kinds.bodies.mesh import make
 
 from tables import cases
@@ -26,7 +28,7 @@ boxes = {"length": some.floats(0.02, 0.3), "height": some.floats(0.01, 0.05), "s
 def test_any_box_is_covered_once(mesh_type, length, height, size):
     mesh = st.MESH_TYPES[mesh_type](length, height, size)
     for corners in mesh.cells.values():
-        assert (meshes.signed_areas(mesh.points, corners) > 0).all()
+        assert (signed_areas(mesh.points, corners) > 0).all()
     assert mesh.area == pytest.approx(length * height, rel=1e-9)
     assert not mesh.inverted(mesh.points)
     # Euler's formula of a disc, diagonals left out, and each edge at one or two cells.
@@ -54,7 +56,7 @@ def test_rows_are_equilateral_where_they_fit():
     height = 4 * np.sqrt(3) / 2 * 5e-3
     mesh = structured(0.05, height, 5e-3)
     corners = mesh.points[mesh.triangles]
-    whole = np.isclose(meshes.signed_areas(mesh.points, mesh.triangles), np.sqrt(3) / 4 * 25e-6)
+    whole = np.isclose(signed_areas(mesh.points, mesh.triangles), np.sqrt(3) / 4 * 25e-6)
     sides = np.linalg.norm(corners[whole] - np.roll(corners[whole], 1, axis=1), axis=2)
     # 4 rows of 10 triangles on one base and 9 on the other; the two halves at each row's ends are cut.
     assert whole.sum() == 4 * (10 + 9)
@@ -64,7 +66,7 @@ def test_rows_are_equilateral_where_they_fit():
 def test_lattice_is_equilateral_throughout():
     mesh = lattice(7, 5, 2.0)
     assert np.allclose(mesh.edge_lengths, 2.0, rtol=1e-9)
-    assert meshes.quality(mesh) == pytest.approx({"minimum_angle": 60.0, "edge_length_spread": 0.0}, abs=1e-7)
+    assert quality(mesh) == pytest.approx({"minimum_angle": 60.0, "edge_length_spread": 0.0}, abs=1e-7)
 
 
 @pytest.mark.parametrize("size", [5e-3, 2e-3])
@@ -75,14 +77,14 @@ def test_free_has_the_imposed_size_on_its_outline_and_is_delaunay(size):
     other = Delaunay(mesh.points).simplices
     ours, theirs = ({tuple(sorted(corners)) for corners in triangles.tolist()} for triangles in (mesh.triangles, other))
     assert ours == theirs
-    assert meshes.quality(mesh)["minimum_angle"] > 30
+    assert quality(mesh)["minimum_angle"] > 30
 
 
 def test_quality_of_a_right_isosceles_triangle():
     mesh = st.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
     lengths = np.array([1.0, 1.0, np.sqrt(2)])
     expected = {"minimum_angle": 45.0, "edge_length_spread": lengths.std() / lengths.mean()}
-    assert meshes.quality(mesh) == pytest.approx(expected)
+    assert quality(mesh) == pytest.approx(expected)
 
 
 @pytest.mark.usefixtures("mesh_library")
@@ -92,7 +94,7 @@ def test_file_keeps_every_digit(tmp_path, mesh_type, box):
     mesh = st.MESH_TYPES[mesh_type](*box)
     write_mesh(tmp_path / "mesh.vtu", mesh)
     assert len(read_beam_mesh(tmp_path / "mesh.vtu", *box[:2]).edges) == len(mesh.edges)
-    again = meshes.read_mesh(tmp_path / "mesh.vtu")
+    again = read_mesh(tmp_path / "mesh.vtu")
     assert (again.points == mesh.points).all()
     assert (again.triangles == mesh.triangles).all() and (again.quads == mesh.quads).all()
     kinds = {"braced": ["quad"]}.get(mesh_type, ["triangle"])
@@ -110,7 +112,7 @@ def test_files_that_are_no_plane_mesh_are_refused(tmp_path, points, cells, messa
     path = tmp_path / "mesh.vtu"
     meshio.Mesh(points, cells).write(path)
     with pytest.raises(st.MeshError, match=f"mesh.vtu: .*{message}"):
-        meshes.read_mesh(path)
+        read_mesh(path)
 
 
 @pytest.mark.usefixtures("mesh_library")
@@ -118,7 +120,7 @@ def test_unreadable_file_is_refused(tmp_path):
     for name, content in (("mesh.txt", "nothing"), ("mesh.vtu", "nothing"), ("mesh.msh", "$MeshFormat")):
         (tmp_path / name).write_text(content)
         with pytest.raises(st.MeshError, match=f"{name}: (cannot be read|unknown format).*(convert|write) it"):
-            meshes.read_mesh(tmp_path / name)
+            read_mesh(tmp_path / name)
 
 
 FORMATS = {"vtu": "vtu", "med": "med", "gmsh22": "msh", "abaqus": "inp"}
@@ -141,7 +143,7 @@ def test_a_beam_may_come_from_any_format(tmp_path, name, mesh_type):
     # Formats in text keep some twelve digits.
     assert np.allclose(found.points, mesh.points, rtol=0, atol=1e-9 * 0.1)
     assert len(found.edges) == len(mesh.edges)
-    assert (meshes.signed_areas(found.points, next(iter(found.cells.values()))) > 0).all()
+    assert (signed_areas(found.points, next(iter(found.cells.values()))) > 0).all()
     for axis, end in ((0, 0.1), (1, 0.02)):
         for value in (0.0, end):
             assert len(found.outline_edges(axis, value)) == len(mesh.outline_edges(axis, value))
@@ -303,7 +305,7 @@ def test_points_that_are_nowhere_are_refused(tmp_path, point, corner, message):
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_isosceles_rows_have_the_shape_for_their_poisson_ratio(nu):
-    mesh = meshes.isosceles(0.2, 0.04, 2e-3, nu)
+    mesh = isosceles(0.2, 0.04, 2e-3, nu)
     x, y = np.abs(mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]).T
     slanted = (x > 1e-9) & (y > 1e-9)
     # Rows and cells are whole numbers: 22 and 28 rows, 100 cells.
@@ -315,5 +317,5 @@ def test_quads_turn_inside_out_corner_by_corner():
     assert not mesh.inverted(mesh.points)
     pushed = mesh.points.copy()
     pushed[mesh.quads[0, 0]] = [0.008, 0.008]  # past the diagonal: the area stays positive
-    assert meshes.signed_areas(pushed, mesh.quads)[0] > 0
+    assert signed_areas(pushed, mesh.quads)[0] > 0
     assert mesh.inverted(pushed)

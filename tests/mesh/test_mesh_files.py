@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 import springtune as st
-from springtune.mesh import write_mesh
-from springtune.mesh.formats import read_shape
+from springtune.mesh.formats import read_shape, write_mesh
 
 # Two rows of four cells of 15 x 10 mm, the upper ones halved; the left half is hard.
 POINTS = np.array([[15.0 * i, 10.0 * j] for j in range(3) for i in range(5)])

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import springtune as st
-from springtune.mesh import quality, signed_areas, write_mesh
-from springtune.mesh.formats import read_shape
-from springtune.mesh.outlines import mesh_shape
+from springtune.mesh.cells import quality, signed_areas
+from springtune.mesh.formats import read_shape, write_mesh
+from springtune.mesh.free import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
 from springtune.problem.boundary import check_case
 

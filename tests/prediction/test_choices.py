@@ -16,7 +16,7 @@ from problems import pulled
 from tables import slow_but
 
 # Random beams may be thicker than they are high: thickness is a factor.
-pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.shapes.AssumptionWarning")
 
 
 def springs_of(choice, mesh, beam, material):

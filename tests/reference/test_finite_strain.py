@@ -9,9 +9,9 @@ from hypothesis import strategies as some
 from scipy.optimize import brentq, minimize_scalar
 
 import springtune as st
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
+from springtune.problem.shapes import Beam
 from springtune.reference.answers import elastica
 from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import FiniteStrainError, law_of, solve_finite_strain

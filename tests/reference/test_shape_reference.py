@@ -8,7 +8,7 @@ import pytest
 import shapes_of_others as others
 import springtune as st
 from springtune.mesh.cells import signed_areas
-from springtune.mesh.outlines import mesh_shape
+from springtune.mesh.free import mesh_shape
 from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
 from springtune.reference import shapes
 from springtune.reference.shapes import Level, solve_each, solve_shape

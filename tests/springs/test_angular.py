@@ -6,7 +6,7 @@ import pytest
 import springtune as st
 from periodic import periodic_delaunay
 from springtune.mechanics.energies import AngleEnergy, BiquadraticEnergy
-from springtune.mesh import lattice
+from springtune.mesh.rows import lattice
 from springtune.springs.ielsm import angle_moduli
 from springtune.springs.normal_shear import slip_form
 

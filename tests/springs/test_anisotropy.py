@@ -10,7 +10,8 @@ from hypothesis import strategies as some
 import springtune as st
 from periodic import affine_stiffness
 from springtune.mechanics.continuum import PatchTest
-from springtune.mesh import lattice, signed_areas
+from springtune.mesh.cells import signed_areas
+from springtune.mesh.rows import lattice
 from springtune.springs.parts import derive_by_parts
 
 from problems import free_network

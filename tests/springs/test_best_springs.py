@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.mechanics.continuum import PatchTest
-from springtune.mesh import lattice
+from springtune.mesh.rows import lattice
 from springtune.springs.best_springs import DISPLACEMENT_WEIGHT, STRETCH_WEIGHT, LoadSpace
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.searched import adjoint

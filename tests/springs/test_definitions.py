@@ -13,7 +13,8 @@ from scipy.optimize import nnls
 import springtune as st
 from springtune.mechanics.continuum import PatchTest
 from springtune.mechanics.network import Network
-from springtune.mesh import lattice, signed_areas
+from springtune.mesh.cells import signed_areas
+from springtune.mesh.rows import lattice
 from springtune.springs.element_fit import least_squares
 from springtune.springs.lattice import predicted_stiffness
 

@@ -12,7 +12,8 @@ import shapes_of_others as others
 import springtune as st
 from springtune.mechanics.continuum import PatchTest, isotropic_moduli, strip_fault
 from springtune.mechanics.network import Network
-from springtune.mesh import lattice, signed_areas
+from springtune.mesh.cells import signed_areas
+from springtune.mesh.rows import lattice
 from springtune.springs.patch_fit import TESTS, outline_tests
 
 from patches import errors, patch

@@ -5,7 +5,8 @@ import pytest
 
 import springtune as st
 from springtune.mechanics.continuum import PatchTest
-from springtune.mesh import lattice, write_mesh
+from springtune.mesh.formats import write_mesh
+from springtune.mesh.rows import lattice
 from springtune.mesh.sheets import bonded
 
 from patches import disturbed, patch

@@ -12,7 +12,7 @@ import springtune as st
 from springtune.mechanics.energies import NeoHookeEnergy, YeohEnergy
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import signed_areas
+from springtune.mesh.cells import signed_areas
 from springtune.problem.loads import AXIAL, BENDING, FACE
 from springtune.problem.materials import RUBBER_TESTS
 from springtune.problem.rubber import TensileTest, TestDataError

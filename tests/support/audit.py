@@ -25,7 +25,7 @@ from arches import ENDS, Arch
 from mechanics import LONG, Body, Part, area_of, sides_of, spring_forces
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import FollowerPressure
-from springtune.problem.geometry import AssumptionWarning
+from springtune.problem.shapes import AssumptionWarning
 from springtune.scene.mesh_cache import Loading, MeshCache, solve_and_judge
 from springtune.studies.kinds.bodies.solve import solve as solve_scene
 from springtune.studies.kinds.bodies.solve import solve_beam

@@ -4,7 +4,7 @@ import numpy as np
 
 import springtune as st
 from springtune.mechanics.continuum import PatchTest
-from springtune.mesh import ROW_HEIGHT, lattice
+from springtune.mesh.rows import ROW_HEIGHT, lattice
 
 HEIGHT, SIZE = 20e-3, 2e-3
 

@@ -8,7 +8,7 @@ import springtune as st
 from springtune.linalg.factors import SingularError, SuperLUFactor
 from springtune.mechanics.continuum import unit_fields, work_of
 from springtune.mechanics.network import Network
-from springtune.mesh import signed_areas
+from springtune.mesh.cells import signed_areas
 
 
 def periodic_delaunay(points, length, height):

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 import springtune as st
-from springtune.mesh import write_mesh
+from springtune.mesh.formats import write_mesh
 
 from campaigns import Campaign
 from tables import STUDIES

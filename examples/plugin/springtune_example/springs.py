@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from springtune.mesh import Mesh, mesh_type, right
+from springtune.mesh.cells import Mesh, mesh_type
+from springtune.mesh.rows import right
 from springtune.problem.loads import BOTH, BOTTOM, TOP, Load, LoadKind
 from springtune.springs import Springs, definition
 

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from ..problem.geometry import Beam
-from ..problem.parameters import PLANES
-from ..problem.quantities import nearest, positive
-from ..safe_io.tables import mesh_size_text
+from ..problem.quantities import PLANES, nearest, positive
+from ..problem.shapes import Beam
+from ..safe_io.texts import mesh_size_text
 from ..studies.runs.source import is_source_tree
 
 if TYPE_CHECKING:
     from ..mesh.cells import Mesh
-    from ..mesh.groups import GroupedMesh
+    from ..mesh.sheets import GroupedMesh
     from ..problem.materials import Material
     from ..problem.shapes import Shape
     from ..studies.config.model import Study
@@ -206,8 +205,8 @@ def _size(given: Mapping[str, Any], needed: bool) -> float | None:
 
 
 def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
+    from ..mesh.cells import MESH_TYPES
     from ..mesh.formats import read_beam_mesh
-    from ..mesh.types import MESH_TYPES
     from ..scene.meshes import make_mesh
 
     material, mesh_type, size = read_material(given), given["mesh"] or "structured", None
@@ -267,7 +266,7 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
 def _shape_mesh(shape: "Shape", refined: Mapping[str, float], _: str, size: float | None) -> "GroupedMesh":
     """Make the mesh of a shape, refined as in its study."""
     from ..mesh.formats import read_shape  # here, since studies are read without scipy
-    from ..mesh.outlines import mesh_shape
+    from ..mesh.free import mesh_shape
 
     if size is None:
         return read_shape(shape.file, shape.unit)

@@ -189,7 +189,7 @@ def _answer_for_error(
     body: BodyOptions, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None
 ) -> Answer:
     """Coarsest mesh that keeps an error."""
-    from ..mesh.types import MESH_TYPES
+    from ..mesh.cells import MESH_TYPES
     from ..prediction.search import find_mesh
     from .recommendation import search_text
 
@@ -369,7 +369,7 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     """Options of each test of a file: one test of a CSV file, the list in a YAML file."""
     from yaml import YAMLError, safe_load
 
-    from ..safe_io.inputs import LARGEST_CSV, read
+    from ..safe_io.files import LARGEST_CSV, read
 
     if path.suffix not in (".yaml", ".yml"):
         return [{"file": path}]

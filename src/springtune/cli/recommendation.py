@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..problem.compare import error_text, sign_sentence, sign_word
-from ..problem.geometry import size_text
-from ..problem.shapes import QUANTITY_UNITS
-from ..safe_io.tables import TabledList, aligned, mesh_size_text
+from ..problem.shapes import QUANTITY_UNITS, size_text
+from ..safe_io.texts import TabledList, aligned, mesh_size_text
 
 if TYPE_CHECKING:
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
     from ..prediction.choices import Choice
     from ..prediction.search import MeshSearch
-    from ..problem.geometry import Beam
     from ..problem.materials import Material
+    from ..problem.shapes import Beam
     from ..scene.boundary_problem import ShapeProblem
 
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..problem.geometry import AssumptionWarning
 from ..problem.quantities import nearest
+from ..problem.shapes import AssumptionWarning
 from ..registry import NAME, NAME_RULE, how_to_install
-from ..safe_io.atomic import write_bytes, write_text
-from ..safe_io.tables import aligned
+from ..safe_io.files import write_bytes, write_text
+from ..safe_io.texts import aligned
 from ..studies.runs.source import CONFIG_FOLDER, TASKS, USUAL_STUDY, config_file, is_source_tree, workflow_folder
 from . import WrongCall, examples
 
@@ -101,7 +101,7 @@ def _path(given: str) -> Path:
 
 def template_text(path: Path, body: str) -> str:
     """Text of a new study of a beam or of a shape."""
-    from ..mesh.types import MESH_TYPES
+    from ..mesh.cells import MESH_TYPES
 
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
     template = Template(Path(__file__).with_name(f"study_of_a_{body}.yaml").read_text())

@@ -14,13 +14,12 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.simulation import ENERGY_WORDS
-from ..handover.terms import Net
+from ..handover.simulation import ENERGY_WORDS, Net
 from ..mechanics import PRECISIONS
 from ..mechanics.energies import Energy
 from ..problem.quantities import positive
 from ..registry import Declaration, Registry, how_to_install
-from ..safe_io.tables import number_text
+from ..safe_io.texts import number_text
 
 MOST_STEPS, LONGEST_FRAME = 100_000, 1.0
 """Most substeps and iterations, and the longest frame [s]."""
@@ -165,7 +164,7 @@ class Engine(Declaration):
     needs, extra : tuple of str, str
         Modules that it imports, as ``"mujoco>=3.13"``, and the optional dependencies of springtune that have them.
     laws : tuple of str
-        Energies that it has besides springs, keys of `springtune.handover.terms.FORMULAS`.
+        Energies that it has besides springs, keys of `springtune.handover.simulation.FORMULAS`.
     precisions, iterates : tuple of str, bool
         Its own precision first; whether iterations mean something to it.
     parameters, typed, of_setting : dict of str to Parameter, callable, bool

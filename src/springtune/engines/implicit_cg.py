@@ -8,8 +8,7 @@ iterations; too few make it slow, or it does not come to rest. In single precisi
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.simulation import network_of
-from ..handover.terms import FORMULAS
+from ..handover.simulation import FORMULAS, network_of
 from ..mechanics import BackwardEuler
 from ..mechanics.dynamics import Motion
 from ..mechanics.stepping import make_stepper

@@ -6,8 +6,7 @@ A solver that begins at ``y = x + h v + h^2 f / m`` and stops early rests too fa
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.simulation import ENERGY_WORDS
-from ..handover.terms import VALUES
+from ..handover.simulation import ENERGY_WORDS, VALUES
 from ..linalg.kernels import compiled
 from .base import SPRING_STIFFNESS, EngineError, Parameter, Setting
 

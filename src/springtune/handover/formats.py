@@ -11,16 +11,16 @@ import numpy as np
 import pandas as pd
 
 from ..mesh.formats import MOST_MESSAGE_CHARACTERS
-from ..safe_io.atomic import check_folder, replacing, write_text
-from ..safe_io.escapes import json_line, shown
+from ..safe_io.files import check_folder, replacing, write_text
+from ..safe_io.texts import json_line, shown
 from ..scene.single import Scene
 from ..springs.base import Springs
 from .mujoco import mjcf
 from .net import NOT_COMPUTED, SpringNet
 from .newton import newton_script
 from .paraview import write_vtu
+from .simulation import CORNER_VALUES, VALUES, Net, Terms
 from .sofa import sofa_python
-from .terms import CORNER_VALUES, VALUES, Net, Terms
 from .xpbd import xpbd
 
 

@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..safe_io.escapes import printable
-from .simulation import Simulation, comment_lines, fill_template, lame, load_in_words, numbers, simulate
-from .terms import Net, Terms
+from ..safe_io.texts import printable
+from .simulation import Net, Simulation, Terms, comment_lines, fill_template, lame, load_in_words, numbers, simulate
 
 LEAST_MASS = 1e-15
 """Mass below which MuJoCo takes no body that moves [kg]."""

@@ -17,12 +17,12 @@ from ..mechanics import IMPLICIT, INTEGRATORS
 from ..mechanics.dynamics import masses
 from ..mesh.cells import Mesh
 from ..problem.compare import error_text, sign_sentence
-from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
+from ..problem.shapes import Beam
 from ..registry import hook
-from ..safe_io.tables import Tabled
+from ..safe_io.texts import Tabled
 from ..scene.boundary_problem import BeamProblem, ShapeProblem, check_filled
 from ..scene.mesh_cache import (
     A_BEAM,
@@ -38,7 +38,7 @@ from ..scene.mesh_cache import (
 from ..scene.motion import stable_steps
 from ..scene.single import Scene
 from ..springs.base import Definition, DefinitionError, Springs
-from .terms import Net, Terms, terms_of
+from .simulation import Net, Terms, terms_of
 
 UNITS = {
     "points": "m",

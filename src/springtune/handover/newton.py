@@ -10,8 +10,7 @@ and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`, at small st
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
-from .simulation import comment_lines, fill_template, lame, simulate
-from .terms import Net
+from .simulation import Net, comment_lines, fill_template, lame, simulate
 
 LAWS = ("biquadratic",)
 """Energies that triangles of Newton stand for."""

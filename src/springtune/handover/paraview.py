@@ -7,8 +7,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..mesh.formats import library
-from ..safe_io.atomic import replacing
-from ..safe_io.escapes import shown
+from ..safe_io.files import replacing
+from ..safe_io.texts import shown
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
 """meshio's names of cells by their corners."""

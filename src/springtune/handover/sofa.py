@@ -7,8 +7,7 @@ given (sofa issue 5135).
 
 import numpy as np
 
-from .simulation import STEPS_PER_PERIOD, comment_lines, fill_template, numbers, simulate
-from .terms import Net
+from .simulation import STEPS_PER_PERIOD, Net, comment_lines, fill_template, numbers, simulate
 
 BACKWARD_EULER = (
     ("Sofa.Component.ODESolver.Backward", "EulerImplicitSolver"),

@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.energies import area_slopes
-from .simulation import fill_template, simulate
-from .terms import VALUES, Net, Terms
+from .simulation import VALUES, Net, Terms, fill_template, simulate
 
 OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
 """Units of what the terms of an energy do not have."""

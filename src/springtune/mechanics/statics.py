@@ -18,7 +18,7 @@ import numpy as np
 
 from ..linalg.factors import Factor
 from ..linalg.factors import SingularError as SingularError
-from ..problem.status import Status
+from ..problem.quantities import Status
 from .continuation import continue_path
 from .network import Network
 from .newton import Equilibrium, LoadedNetwork, uncertainty

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import MeshError
-from .groups import OTHER_FILES_REASON, Block, Content, places
+from .sheets import OTHER_FILES_REASON, Block, Content, places
 
 KEYWORDS_NOT_READ = {
     r"N(GEN|FILL|COPY|MAP)|EL(GEN|COPY)|SYSTEM|PARAMETER|IMPORT|SYMMETRICMODEL\w*|MODELCHANGE": (

@@ -11,13 +11,23 @@ from typing import Any
 import numpy as np
 
 from ..registry import NAME, NAME_RULE
-from ..safe_io.atomic import check_folder, replacing
-from ..safe_io.inputs import DataElsewhere, bounded, check_alone, why_unreadable
+from ..safe_io.files import DataElsewhere, bounded, check_alone, check_folder, replacing, why_unreadable
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas
-from .groups import LINEAR_CELLS_REMEDY, OTHER_FILES_REASON, Block, Content, GroupedMesh, part_names
-from .segments import in_words
-from .sheets import COORDINATE_TOLERANCE, box_fault, on_sides, outline_of, sheet_fault
+from .sheets import (
+    COORDINATE_TOLERANCE,
+    LINEAR_CELLS_REMEDY,
+    OTHER_FILES_REASON,
+    Block,
+    Content,
+    GroupedMesh,
+    box_fault,
+    on_sides,
+    outline_of,
+    part_names,
+    sheet_fault,
+)
+from .sides import in_words
 
 CORNER_COUNTS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
 """Points of cells that are read and of those that make groups, by meshio's name."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .cells import MeshError
-from .groups import LINEAR_CELLS_REMEDY, Block, Content, places
+from .sheets import LINEAR_CELLS_REMEDY, Block, Content, places
 
 ELEMENT_TYPES = {15: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4)}
 """Name and number of points of elements that are read, by Gmsh's number."""

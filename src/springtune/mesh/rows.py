@@ -6,8 +6,7 @@ from numbers import Integral, Real
 
 import numpy as np
 
-from .cells import Mesh, MeshError, no_cells
-from .types import check_box, mesh_type, nearest_counts, nearest_whole
+from .cells import Mesh, MeshError, check_box, mesh_type, nearest_counts, nearest_whole, no_cells
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""

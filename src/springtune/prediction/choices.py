@@ -11,16 +11,14 @@ from ..mechanics.continuum import PatchTest
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
 from ..mechanics.statics import SingularError
 from ..mesh.cells import Mesh
-from ..mesh.groups import GroupedMesh
+from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text, quantity_errors
-from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import nearest
-from ..problem.shapes import Shape
-from ..problem.status import Status
+from ..problem.quantities import Status, nearest
+from ..problem.shapes import Beam, Shape
 from ..reference.small_strain import ReferenceNotConvergedError
-from ..safe_io.tables import Tabled, TabledList
+from ..safe_io.texts import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
 from ..scene.mesh_cache import A_BEAM, A_MATERIAL, A_MESH, MeshCache, choose, is_a
 from ..scene.motion import stable_steps

@@ -16,15 +16,14 @@ from typing import cast
 
 import numpy as np
 
-from ..mesh.groups import GroupedMesh
-from ..mesh.outlines import mesh_shape
-from ..mesh.types import MESH_TYPES
+from ..mesh.cells import MESH_TYPES
+from ..mesh.free import mesh_shape
+from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text
-from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import quantity
-from ..problem.shapes import Shape
-from ..safe_io.tables import Tabled, mesh_size_text
+from ..problem.shapes import Beam, Shape
+from ..safe_io.texts import Tabled, mesh_size_text
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
 from ..scene.mesh_cache import A_MATERIAL, is_a
 from .choices import (

@@ -5,9 +5,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
-from ..mesh.groups import GroupedMesh, part_names
-from ..mesh.segments import in_words
-from ..mesh.sheets import check_held
+from ..mesh.sheets import GroupedMesh, check_held, part_names
+from ..mesh.sides import in_words
 from .loads import MIDDLE, LoadKind, Side
 from .shapes import LoadCase, Quantity
 

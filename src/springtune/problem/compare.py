@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .status import Status
+from .quantities import Status
 
 ROOT_TOLERANCE = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""

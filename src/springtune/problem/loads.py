@@ -28,8 +28,7 @@ from functools import cached_property
 from typing import Any
 
 from ..registry import NAME, NAME_RULE, ExtensibleMapping
-from .geometry import Beam
-from .shapes import LoadCase, Quantity, Support, Traction
+from .shapes import Beam, LoadCase, Quantity, Support, Traction
 
 MIDDLE = "middle"
 """Name of the middle of a pressed side, as a group."""

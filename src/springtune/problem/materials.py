@@ -24,8 +24,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from .parameters import PLANES
-from .quantities import Number, positive, put, quantity
+from .quantities import PLANES, Number, positive, put, quantity
 
 INCOMPRESSIBLE = (
     "0.5: in plane strain an incompressible material has no finite stiffness; give a ratio below 0.5 such as 0.49, or "

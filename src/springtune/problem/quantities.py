@@ -1,8 +1,9 @@
-"""User input: quantities as texts with units or numbers in SI units, and known names."""
+"""User input: quantities as texts with units or numbers in SI units, known names, swept parameters; the status."""
 
 import math
 from collections.abc import Iterable
 from difflib import get_close_matches
+from enum import IntEnum
 from typing import Any
 
 Number = float | Any
@@ -72,3 +73,93 @@ def nearest(word: str, words: Iterable[str]) -> str:
     hint = f"did you mean '{near[0]}'? " if near else ""
     more = f" and {len(words) - MOST_WORDS} more" if len(words) > MOST_WORDS else ""
     return f"{hint}known: {', '.join(words[:MOST_WORDS])}{more}"
+
+
+SWEPT = {
+    "force": ("size of the force on the loaded side; the load says its direction", "N"),
+    "thickness": ("thickness of the sheet", "m"),
+    "young_modulus": ("Young's modulus", "Pa"),
+    "poisson_ratio": ("Poisson's ratio", "1"),
+    "stiffness_scale": ("factor on the stiffness that the definition gives", "1"),
+}
+"""Description and unit of each by its name in studies and datasets."""
+
+PLANES = "stress", "strain"
+"""Plane stress and plane strain: the quantity that is zero across a sheet."""
+
+OF_BODIES = {
+    "thickness": "beam_thickness",
+    "young_modulus": "material_young_modulus",
+    "poisson_ratio": "material_poisson_ratio",
+}
+"""Variable of a dataset that holds a parameter of beams or materials."""
+
+MOST_SCENES = 1_000_000
+"""Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
+
+MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"
+"""Variable of the environment with another number."""
+
+
+def shown_order(name: str, value: float) -> float:
+    """Rank of a swept parameter's value: if only one can be shown, it is the last one present."""
+    return -abs(value - 1) if name == "stiffness_scale" else value
+
+
+def with_unit(name: str, value: float, digits: int = 4) -> str:
+    r"""Return a swept parameter's value with its unit, without line breaks.
+
+    >>> with_unit("force", 4e5), with_unit("thickness", 2e-3), with_unit("poisson_ratio", 0.3)
+    ('400\xa0kN', 'thickness 2\xa0mm', 'nu\xa0=\xa00.3')
+    """
+    if name == "force":
+        text = f"{value / 1e3:.{digits}g} kN" if abs(value) >= 1e3 else f"{value:.{digits}g} N"
+    elif name == "thickness":
+        return f"thickness {1e3 * value:.{digits}g}\u00a0mm"
+    elif name == "young_modulus":
+        text = f"E = {value / 1e9:.{digits}g} GPa" if value >= 1e9 else f"E = {value / 1e6:.{digits}g} MPa"
+    elif name == "poisson_ratio":
+        text = f"nu = {value:.{digits}g}"
+    else:
+        return f"stiffness times\u00a0{value:.{digits}g}"
+    return text.replace(" ", "\u00a0")
+
+
+class Status(IntEnum):
+    """Status of a solve, such as a scene or a point of a curve; flags of a dataset's variables ``status``.
+
+    Stored as a number; its text is the flag's meaning.
+
+    Attributes
+    ----------
+    NOT_REQUESTED
+        Was not requested.
+    SOLVED
+        A stable equilibrium.
+    LINEAR_ONLY
+        Only the linear equilibrium.
+    NOT_CONVERGED
+        No equilibrium was found.
+    UNSTABLE
+        An unstable equilibrium, or an unstable path to it.
+    FAILED
+        Nothing to solve: a definition refuses the mesh, a reference is missing, or the program failed.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> str(st.Status.NOT_CONVERGED), int(st.Status.NOT_CONVERGED)
+    ('not_converged', 3)
+    >>> st.Status(4)
+    <Status.UNSTABLE: 4>
+    """
+
+    NOT_REQUESTED = 0
+    SOLVED = 1
+    LINEAR_ONLY = 2
+    NOT_CONVERGED = 3
+    UNSTABLE = 4
+    FAILED = 5
+
+    def __str__(self) -> str:
+        return self.name.lower()

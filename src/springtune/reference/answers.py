@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..problem.geometry import Beam
 from ..problem.loads import LoadKind
 from ..problem.materials import Material
+from ..problem.shapes import Beam
 
 
 @dataclass(frozen=True)

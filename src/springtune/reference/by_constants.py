@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array, kron
 
 from ..linalg.factors import factorize
-from ..mesh.groups import GroupedMesh
+from ..mesh.sheets import GroupedMesh
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Shape
 from .shapes import VOIGT, solve_shape

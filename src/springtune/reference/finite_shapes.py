@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..mesh.groups import GroupedMesh
+from ..mesh.sheets import GroupedMesh
 from ..problem.materials import AnyMaterial, Material
 from ..problem.shapes import LoadCase, Shape
 from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law_of, matrix_of, strain_of

@@ -23,9 +23,9 @@ from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
 from ..linalg.factors import SingularError, SuperLUFactor
-from ..problem.geometry import Beam
 from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
 from ..problem.materials import Material, Rubber
+from ..problem.shapes import Beam
 from .answers import BeamField
 from .small_strain import ReferenceNotConvergedError
 

@@ -9,9 +9,8 @@ from scipy.sparse import coo_array
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
-from ..mesh.groups import GroupedMesh
-from ..mesh.segments import in_words
-from ..mesh.sheets import check_held
+from ..mesh.sheets import GroupedMesh, check_held
+from ..mesh.sides import in_words
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .answers import most_rotation_and_strain

@@ -16,9 +16,9 @@ from numpy.polynomial.legendre import legvander
 from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_array, kron
 
 from ..linalg.factors import factorize
-from ..problem.geometry import Beam
 from ..problem.loads import AXIAL, BOTTOM, LEFT, RIGHT, TOP, LoadKind
 from ..problem.materials import Material
+from ..problem.shapes import Beam
 from .answers import BeamField, rotation_and_strain, unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.

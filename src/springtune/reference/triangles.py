@@ -18,7 +18,7 @@ from scipy import spatial
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.free import triangulate, upright
-from ..mesh.groups import GroupedMesh, part_names
+from ..mesh.sheets import GroupedMesh, part_names
 from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE

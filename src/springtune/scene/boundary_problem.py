@@ -11,10 +11,8 @@ import numpy as np
 
 from ..mechanics.network import FollowerPressure, Network
 from ..mesh.cells import Mesh
-from ..mesh.groups import GroupedMesh, part_names, parts_of
-from ..mesh.segments import in_words
-from ..mesh.sheets import box_fault
-from ..mesh.sides import OutlineSide
+from ..mesh.sheets import GroupedMesh, box_fault, part_names, parts_of
+from ..mesh.sides import OutlineSide, in_words
 from ..problem.boundary import (
     cell_at,
     check_case,
@@ -25,11 +23,10 @@ from ..problem.boundary import (
     reaction_weights,
     supported,
 )
-from ..problem.geometry import Beam, warn_of_size, warn_of_thickness
 from ..problem.loads import LOADS, Load, LoadKind
 from ..problem.materials import AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
-from ..problem.shapes import LoadCase, Quantity, Shape
+from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_size, warn_of_thickness
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
 from .mesh_cache import (

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from ..mechanics.series import LinearPath, StablePath
 from ..problem.compare import Best, best_stiffness, deformation_error, error_text
 from ..problem.loads import LoadKind
-from ..problem.status import Status
+from ..problem.quantities import Status
 from ..registry import hook
-from ..safe_io.tables import Tabled
+from ..safe_io.texts import Tabled
 from ..springs.base import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .mesh_cache import MeshCache

@@ -15,15 +15,15 @@ from scipy.optimize import least_squares
 from scipy.spatial import KDTree
 from scipy.stats import f, t
 
-from ..mesh.groups import parts_of
+from ..mesh.sheets import parts_of
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, rotated
 from ..problem.quantities import Number, nearest, positive
 from ..problem.rubber import TestDataError
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
-from ..safe_io.inputs import number_of
-from ..safe_io.tables import Tabled
+from ..safe_io.files import number_of
+from ..safe_io.texts import Tabled
 from .measured import Block, MeasuredTest, blocks, body_of_test
 from .mesh_cache import choose, is_a
 

@@ -9,14 +9,13 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..mesh.formats import read_shape
-from ..mesh.groups import GroupedMesh
-from ..problem.geometry import Beam
+from ..mesh.sheets import GroupedMesh
 from ..problem.loads import LOADS, MIDDLE, Side
 from ..problem.quantities import Number, nearest, positive, put, quantity
 from ..problem.rubber import TestDataError
-from ..problem.shapes import LoadCase, Segment, Shape
+from ..problem.shapes import Beam, LoadCase, Segment, Shape
 from ..reference.by_constants import Family
-from ..safe_io.inputs import csv_rows, number_of, numbers
+from ..safe_io.files import csv_rows, number_of, numbers
 from .mesh_cache import A_BEAM, choose, is_a
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")

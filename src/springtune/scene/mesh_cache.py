@@ -16,13 +16,12 @@ from ..mechanics.network import FollowerPressure, Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh.cells import Mesh
-from ..mesh.groups import GroupedMesh
+from ..mesh.sheets import GroupedMesh
 from ..problem.boundary import held, loaded_box, measured, side_edges, weights
-from ..problem.geometry import Beam
 from ..problem.loads import LoadKind
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
-from ..problem.quantities import nearest
-from ..problem.status import Status
+from ..problem.quantities import Status, nearest
+from ..problem.shapes import Beam
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 

@@ -3,15 +3,13 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..mesh.cells import Mesh
+from ..mesh.cells import MESH_TYPES, Mesh
 from ..mesh.formats import read_beam_mesh
 from ..mesh.formats import read_shape as read_grouped
-from ..mesh.groups import GroupedMesh
-from ..mesh.outlines import mesh_shape as mesh_outlined
-from ..mesh.types import MESH_TYPES
-from ..problem.geometry import Beam
+from ..mesh.free import mesh_shape as mesh_outlined
+from ..mesh.sheets import GroupedMesh
 from ..problem.quantities import positive
-from ..problem.shapes import Shape
+from ..problem.shapes import Beam, Shape
 from .mesh_cache import A_BEAM, A_SHAPE, choose, is_a
 
 
@@ -68,7 +66,7 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     Examples
     --------
     >>> import springtune as st
-    >>> from springtune.mesh import write_mesh
+    >>> from springtune.mesh.formats import write_mesh
     >>> beam = st.Beam("100 mm", "20 mm")
     >>> write_mesh("own.vtu", st.make_mesh(beam, "free", "5 mm"))
     >>> print(f"{1e6 * st.read_mesh('own.vtu', beam).area:.0f} mm2")
@@ -125,7 +123,7 @@ def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
     Examples
     --------
     >>> import springtune as st
-    >>> from springtune.mesh import write_mesh
+    >>> from springtune.mesh.formats import write_mesh
     >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
     >>> write_mesh("plate.vtu", st.mesh_shape(plate, "4 mm"))
     >>> sorted(st.read_shape("plate.vtu").sides)

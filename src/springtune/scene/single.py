@@ -14,16 +14,14 @@ from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh.cells import Mesh
-from ..mesh.groups import GroupedMesh
+from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text, quantity_errors, sign_word
-from ..problem.geometry import AssumptionWarning, Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
-from ..problem.quantities import positive
-from ..problem.shapes import QUANTITY_UNITS, Shape
-from ..problem.status import Status
+from ..problem.quantities import Status, positive
+from ..problem.shapes import QUANTITY_UNITS, AssumptionWarning, Beam, Shape
 from ..registry import hook
-from ..safe_io.tables import Tabled, number_text
+from ..safe_io.texts import Tabled, number_text
 from ..springs.base import Springs
 from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
 from .mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, naming_errors

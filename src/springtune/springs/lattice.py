@@ -18,9 +18,9 @@ import math
 import numpy as np
 
 from ..mesh.cells import Mesh
-from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import Material
+from ..problem.shapes import Beam
 from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
 
 COEFFICIENT = math.sqrt(3) / 2

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..mesh.cells import Mesh, no_cells
-from ..mesh.groups import GroupedMesh, part_names
+from ..mesh.sheets import GroupedMesh, part_names
 from ..problem.materials import AnyMaterial
 from .base import DefinitionError, Springs
 

@@ -6,8 +6,8 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from springtune.safe_io.atomic import replacing
-from springtune.safe_io.escapes import shown
+from springtune.safe_io.files import replacing
+from springtune.safe_io.texts import shown
 
 from .config.model import Study
 from .output import reading

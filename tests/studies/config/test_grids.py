@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 import springtune as st
-from springtune.problem.parameters import MOST_SCENES_VARIABLE, SWEPT
+from springtune.problem.quantities import MOST_SCENES_VARIABLE, SWEPT
 from springtune.studies.config.fields import spaced
 
 from campaigns import Campaign

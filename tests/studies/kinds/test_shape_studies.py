@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.mesh import write_mesh
+from springtune.mesh.formats import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.plan import shape_mesh_keys, shape_reference_task, shape_scene_task
@@ -261,7 +261,7 @@ def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkey
     assert "10.vtu is 100 x 80 mm, and 5.vtu 100 x 40 mm; give files of one body and unit" in refusal(text)
 
 
-@pytest.mark.filterwarnings("always::springtune.problem.geometry.AssumptionWarning")  # several commands, one process
+@pytest.mark.filterwarnings("always::springtune.problem.shapes.AssumptionWarning")  # several commands, one process
 @pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 m"}, False), ({"unit": "1 mm"}, False)])
 def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
     """A file in mm that is read in m."""

@@ -13,7 +13,7 @@ from test_dataset import GROUPS
 
 import springtune as st
 from springtune.cli import main
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.kinds.collect import group_of

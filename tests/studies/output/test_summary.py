@@ -15,7 +15,7 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 
 import springtune as st
 from snakemake_logger_plugin_springtune import Display, LogHandler
-from springtune.safe_io import atomic
+from springtune.safe_io.files import write_json
 from springtune.studies.kinds.bodies.variables import ROOT
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import rerun
@@ -98,7 +98,7 @@ def planned(tmp_path):
 
 def mark_done(made, name, computed, moment):
     """Mark a job done at a time."""
-    atomic.write_json(made[name].record, {"digest": made[name].digest, "computed": computed})
+    write_json(made[name].record, {"digest": made[name].digest, "computed": computed})
     os.utime(made[name].record, (moment, moment))
 
 

@@ -98,7 +98,7 @@ VERSIONS = {
     "numba": SOLVING,
     "scikit-fem": {"bodies.reference", "benchmark.solve", "bodies.solve", "engines.solve"},
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"bodies.mesh", "box", "bodies.calibrate", "from a file", "lattice"},
+    "scipy": SOLVING | REFERENCE | {"bodies.mesh", "box", "bodies.calibrate", "free", "from a file", "lattice"},
 }
 
 

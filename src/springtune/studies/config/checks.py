@@ -6,11 +6,10 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-from springtune.mesh.types import MESH_TYPES, too_many
+from springtune.mesh.cells import MESH_TYPES, too_many
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE
-from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
-from springtune.problem.quantities import nearest
+from springtune.problem.quantities import MOST_SCENES, MOST_SCENES_VARIABLE, nearest
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 

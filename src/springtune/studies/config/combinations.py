@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field
 
 from springtune.problem.quantities import nearest
-from springtune.safe_io.inputs import Rows, csv_rows
+from springtune.safe_io.files import Rows, csv_rows
 
 from .fields import BeamName, Load, MaterialName, MeshType, Section
 from .messages import Key, Problems, control_character_fault, show, validated

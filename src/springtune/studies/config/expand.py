@@ -6,13 +6,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from springtune.mesh.types import MESH_TYPES
-from springtune.problem.geometry import Beam
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
-from springtune.problem.parameters import SWEPT
+from springtune.problem.quantities import SWEPT
+from springtune.problem.shapes import Beam
 from springtune.registry import NAME, NAME_RULE
-from springtune.safe_io.inputs import why_unreadable
+from springtune.safe_io.files import why_unreadable
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 

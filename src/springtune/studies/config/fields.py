@@ -22,11 +22,10 @@ from pydantic import (
 )
 
 from springtune import units
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import MOST_TERMS
-from springtune.problem.parameters import PLANES
-from springtune.problem.quantities import beyond, nearest
+from springtune.problem.quantities import PLANES, beyond, nearest
 from springtune.registry import NAME, NAME_RULE
 from springtune.springs.base import DEFINITIONS
 

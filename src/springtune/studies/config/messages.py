@@ -13,8 +13,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from springtune.problem.quantities import nearest
-from springtune.safe_io.escapes import UNSEEN, clipped, shown
-from springtune.safe_io.inputs import BeyondSize, read
+from springtune.safe_io.files import BeyondSize, read
+from springtune.safe_io.texts import UNSEEN, clipped, shown
 
 Model = TypeVar("Model", bound=BaseModel)
 

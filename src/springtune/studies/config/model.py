@@ -8,10 +8,9 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnyMaterial, Material
-from springtune.problem.parameters import shown_order
-from springtune.problem.quantities import nearest
+from springtune.problem.quantities import nearest, shown_order
+from springtune.problem.shapes import Beam
 
 if TYPE_CHECKING:
     from springtune.problem.shapes import Shape

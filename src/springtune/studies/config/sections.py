@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
 

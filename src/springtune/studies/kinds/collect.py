@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from springtune.registry import import_name
-from springtune.safe_io import atomic
+from springtune.safe_io.files import write_json, write_text
 
 from ..config.kind import kinds, outputs
 from ..output import dataset, summing_up
@@ -32,7 +32,7 @@ def run(study: "Study", folder: Path, output: Path) -> None:
         raise SystemExit(str(error)) from None
     except OSError as error:
         raise SystemExit(str(error)) from None
-    atomic.write_text(output.with_name(rerun.SUMMARY), summing_up.text(groups, study.title))
+    write_text(output.with_name(rerun.SUMMARY), summing_up.text(groups, study.title))
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
@@ -41,7 +41,7 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     if rerun.collect_digest(study, plan(study, Path(folder))) != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     run(study, Path(folder), Path(output))
-    atomic.write_json(record, {"digest": digest})
+    write_json(record, {"digest": digest})
 
 
 def group_of(kind: "StudyKind") -> dataset.Group:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 
 from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
 

@@ -17,9 +17,8 @@ import xarray as xr
 from xarray.backends import H5NetCDFStore
 from xarray.conventions import cf_encoder, encode_dataset_coordinates
 
-from springtune.problem.parameters import SWEPT
-from springtune.problem.status import Status
-from springtune.safe_io.atomic import replacing
+from springtune.problem.quantities import SWEPT, Status
+from springtune.safe_io.files import replacing
 
 from ..config.kind import EMPTY_VALUES
 

@@ -11,7 +11,7 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.image import AxesImage
 
 from springtune.problem.compare import sign_sentence
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 
 from . import labels, style
 from .error_scale import ERROR_COLOURS, ERROR_RANGE

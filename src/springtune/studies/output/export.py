@@ -12,9 +12,8 @@ import pandas as pd
 import xarray as xr
 
 from springtune.handover.paraview import write_vtu
-from springtune.problem.quantities import nearest
-from springtune.problem.status import Status
-from springtune.safe_io.atomic import check_folder, replacing, write_text
+from springtune.problem.quantities import Status, nearest
+from springtune.safe_io.files import check_folder, replacing, write_text
 
 from ...registry import how_to_install
 from . import reading

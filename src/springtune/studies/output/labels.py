@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 
 from . import style
 from .style import POINTS_PER_INCH, SMALL_TEXT

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from springtune.registry import import_name
-from springtune.safe_io.atomic import write_text
+from springtune.safe_io.files import write_text
 
 from ..config.kind import modules
 from .selection import sign_of_errors

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from springtune.registry import import_name
-from springtune.safe_io import atomic
+from springtune.safe_io.files import write_bytes, write_json
 
 from ..config.kind import outputs
 from . import reading
@@ -41,7 +41,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
 def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
     """Make outputs and write the record of it."""
     run(dataset, folder, *names)
-    atomic.write_json(record, {"digest": digest})
+    write_json(record, {"digest": digest})
 
 
 def _choose_style(tree: xr.DataTree) -> None:
@@ -65,7 +65,7 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     for stem, plot, selection in drawn:
         figure = np.ravel(plot(tree, **selection))[0].figure
         for ending, content in style.png_and_pdf(figure).items():
-            atomic.write_bytes(folder / f"{stem}.{ending}", content)
+            write_bytes(folder / f"{stem}.{ending}", content)
             yield folder / f"{stem}.{ending}"
         plt.close(figure)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.registry import NAME, NAME_RULE
-from springtune.safe_io.escapes import clipped
-from springtune.safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone
+from springtune.safe_io.files import BeyondBound, DataElsewhere, bounded, check_alone
+from springtune.safe_io.texts import clipped
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -185,7 +185,7 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
 def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Dataset":
     import numpy as np
 
-    from springtune.problem.parameters import SWEPT
+    from springtune.problem.quantities import SWEPT
 
     from .selection import SHOWN_PREFIX, choose, group
 

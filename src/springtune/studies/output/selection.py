@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from springtune.problem.geometry import beam_label
-from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
+from springtune.problem.quantities import OF_BODIES, SWEPT, shown_order
+from springtune.problem.shapes import beam_label
 
 from ..config.model import STRAINED_REFERENCE
 from .answers import OWN_LAW_REFERENCES
@@ -163,7 +163,7 @@ def _quoted(labels: Iterable[object]) -> str:
 
 
 def labelled_beam(data: xr.Dataset, name: str) -> str:
-    """Beam name with its dimensions, see `springtune.problem.geometry.beam_label`."""
+    """Beam name with its dimensions, see `springtune.problem.shapes.beam_label`."""
     if "beam_length" not in data:
         return str(name)
     found = data[["beam_length", "beam_height"]]

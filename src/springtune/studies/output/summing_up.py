@@ -9,9 +9,8 @@ import numpy as np
 import xarray as xr
 
 from springtune.problem.compare import sign_word
-from springtune.problem.status import Status
-from springtune.safe_io.escapes import shown
-from springtune.safe_io.tables import aligned
+from springtune.problem.quantities import Status
+from springtune.safe_io.texts import aligned, shown
 
 from . import reading
 from .answers import Columns, Variables, definition_errors, has_own_law, requested_cells, what_to_type

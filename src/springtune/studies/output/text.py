@@ -6,9 +6,8 @@ import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
-from springtune.problem.parameters import SWEPT, with_unit
-from springtune.safe_io.escapes import shown
-from springtune.safe_io.tables import number_text
+from springtune.problem.quantities import SWEPT, with_unit
+from springtune.safe_io.texts import number_text, shown
 
 if TYPE_CHECKING:
     import xarray as xr

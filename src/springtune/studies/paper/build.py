@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from springtune.safe_io import atomic
+from springtune.safe_io.files import write_bytes, write_json
 
 from ..output.text import cell_text
 from . import PaperError, check_typst, numbers
@@ -36,14 +36,14 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
         "datasets": [one.origin() for one in datasets.values()],
         "labels": _labels(datasets),
     }
-    atomic.write_json(folder / "numbers.json", content)
-    atomic.write_bytes(output, typeset(source, folder))
+    write_json(folder / "numbers.json", content)
+    write_bytes(output, typeset(source, folder))
 
 
 def main(source: str, folder: str, output: str, record: str, digest: str, *paths: str) -> None:
     """Build a paper and write its record."""
     run(source, folder, output, *paths)
-    atomic.write_json(record, {"digest": digest})
+    write_json(record, {"digest": digest})
 
 
 def typeset(source: Path, folder: Path) -> bytes:
@@ -147,7 +147,7 @@ def draw(
     """Draw the figures of a paper as PDF files."""
     drawings = {name: validated(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
     for name, drawing in drawings.items():
-        atomic.write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))
+        write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))
     return {name: _origin(drawing, datasets, f"figure {name}") for name, drawing in drawings.items()}
 
 

@@ -28,7 +28,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 from springtune.registry import import_name
 
 from . import store

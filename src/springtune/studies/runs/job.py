@@ -6,8 +6,8 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from springtune.problem.geometry import AssumptionWarning
-from springtune.safe_io import atomic
+from springtune.problem.shapes import AssumptionWarning
+from springtune.safe_io.files import write_json
 
 from .attempts import do_in_worker
 from .source import PACKAGE, RECORDS, STATE, TASKS, hash_of, read_note, source_state
@@ -30,7 +30,7 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
     except DamagedError as error:
         forget_job_of(error.path, Path(tasks).parents[1])
         raise SystemExit(str(error)) from None
-    atomic.write_json(record, {"digest": digest, "computed": computed})
+    write_json(record, {"digest": digest, "computed": computed})
 
 
 def _note(tasks: str, digest: str) -> dict[str, Any]:

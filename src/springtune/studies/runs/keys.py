@@ -16,9 +16,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from springtune.mesh.types import MESH_TYPES
-from springtune.problem.geometry import Beam
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.materials import Material
+from springtune.problem.shapes import Beam
 from springtune.registry import Declaration, plugin_packages
 from springtune.springs.base import DEFINITIONS
 

@@ -8,7 +8,7 @@ from math import log2
 from pathlib import Path
 from typing import Any
 
-from springtune.safe_io import atomic
+from springtune.safe_io.files import write_bytes
 
 from ..config.kind import Stage, kinds
 from ..config.model import Study
@@ -70,7 +70,7 @@ class Job:
         """Write the note that a job of a stage reads; an unchanged one stays."""
         if self.stage and read_note(self.tasks).get("digest") != self.digest:
             note = {"digest": self.digest, "module": self.stage.module, "products": self.products}
-            atomic.write_bytes(self.tasks, json.dumps(note | {"content": self.content}).encode())
+            write_bytes(self.tasks, json.dumps(note | {"content": self.content}).encode())
 
 
 def share_out(seconds: Mapping[str, float]) -> dict[str, list[str]]:

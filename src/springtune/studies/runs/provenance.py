@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from springtune import __version__
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.registry import ExtensibleMapping
 from springtune.springs.base import DEFINITIONS

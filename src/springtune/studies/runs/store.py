@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from springtune.safe_io import atomic
+from springtune.safe_io.files import write_bytes
 
 if TYPE_CHECKING:
     import h5py
@@ -158,7 +158,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
             _put(file, stack, np.stack([value for _, value in members]))
         content = json.dumps([LAYOUT, Path(path).name, scalars, places]).encode()
         _put(file, SCALARS, np.frombuffer(content, np.uint8)[np.newaxis])
-    atomic.write_bytes(path, image.getvalue())
+    write_bytes(path, image.getvalue())
 
 
 def _put(file: "h5py.File", name: str, rows: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.springs.base import DEFINITIONS
 
 OTHER_APPROACHES = (

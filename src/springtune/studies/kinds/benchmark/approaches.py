@@ -12,8 +12,8 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator, cg
 
 from springtune.linalg.factors import factorize
+from springtune.mesh.cells import MESH_TYPES
 from springtune.mesh.rows import structured
-from springtune.mesh.types import MESH_TYPES
 from springtune.problem.boundary import held, measured, weights
 from springtune.reference import calculix
 from springtune.scene.mesh_cache import MeshCache

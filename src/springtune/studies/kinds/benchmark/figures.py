@@ -3,7 +3,7 @@
 import numpy as np
 
 from springtune.problem.compare import unbeaten
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 
 from ...output import labels, style
 from ...output.selection import choose, group

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from springtune.mechanics import PRECISIONS
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program

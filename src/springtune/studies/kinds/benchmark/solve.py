@@ -12,12 +12,12 @@ import numpy as np
 
 from springtune.mechanics import PRECISIONS
 from springtune.mechanics.stepping import make_stepper
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.compare import assured, deformation_error
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material, material_of
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
+from springtune.problem.shapes import Beam
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache

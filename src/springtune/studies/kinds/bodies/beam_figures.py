@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from springtune.problem.loads import LOADS
-from springtune.problem.parameters import SWEPT, with_unit
+from springtune.problem.quantities import SWEPT, with_unit
 from springtune.springs.lattice import COEFFICIENT
 
 from ...config.kind import distinct

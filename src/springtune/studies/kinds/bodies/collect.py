@@ -10,8 +10,8 @@ from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
+from springtune.problem.quantities import Status
 from springtune.problem.shapes import QUANTITY_UNITS
-from springtune.problem.status import Status
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 

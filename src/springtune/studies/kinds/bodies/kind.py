@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from springtune.problem.geometry import size_text
 from springtune.problem.loads import LOADS
+from springtune.problem.shapes import size_text
 from springtune.reference.answers import unit_problem
-from springtune.safe_io.tables import aligned
+from springtune.safe_io.texts import aligned
 
 from ...config.kind import StudyKind
 from ...config.model import SceneSpec, Study

@@ -4,7 +4,7 @@ import time
 from functools import partial
 
 from springtune.mesh.cells import quality
-from springtune.mesh.groups import GroupedMesh
+from springtune.mesh.sheets import GroupedMesh
 
 from . import stored
 

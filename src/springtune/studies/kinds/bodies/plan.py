@@ -22,8 +22,8 @@ from .outputs import MESH_OF_FILE, SHAPES_OUTPUT, mesh_name
 from .stored import CALIBRATION_STEM
 
 if TYPE_CHECKING:
-    from springtune.problem.geometry import Beam
     from springtune.problem.materials import Material
+    from springtune.problem.shapes import Beam
 
     from ...config.model import Study
 

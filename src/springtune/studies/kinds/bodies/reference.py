@@ -4,9 +4,9 @@ import sys
 import time
 from pathlib import Path
 
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Rubber, material_of
+from springtune.problem.shapes import Beam
 
 from ...runs.attempts import solve_files
 from . import unit_references

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from springtune.problem.loads import LOAD_KINDS
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 from springtune.reference.answers import objection
 from springtune.scene.curve import ending, follow, meeting
 from springtune.scene.mesh_cache import MeshCache

@@ -11,11 +11,21 @@ import numpy as np
 
 from springtune.mesh.cells import MeshError
 from springtune.mesh.sheets import free_motion
-from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.quantities import nearest
-from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.safe_io.inputs import why_unreadable
+from springtune.problem.shapes import (
+    AssumptionWarning,
+    Hole,
+    LoadCase,
+    Pressure,
+    Quantity,
+    Segment,
+    Shape,
+    Support,
+    Traction,
+    size_text,
+)
+from springtune.safe_io.files import why_unreadable
 from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import FEWER, check_able, check_density, check_particles
@@ -238,7 +248,7 @@ def _check_file(name, shape, file, path, problems, extents):
         return
     # Here, since few studies have files, and reading one takes scipy.
     from springtune.mesh.formats import read_shape
-    from springtune.mesh.groups import parts_of
+    from springtune.mesh.sheets import parts_of
     from springtune.problem.boundary import check_case
 
     try:

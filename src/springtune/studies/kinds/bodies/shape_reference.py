@@ -4,8 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from springtune.mesh.groups import parts_of
-from springtune.mesh.sheets import outline_of, rounds
+from springtune.mesh.sheets import outline_of, parts_of, rounds
 from springtune.problem.materials import of_parts
 from springtune.reference.shapes import solve_each
 

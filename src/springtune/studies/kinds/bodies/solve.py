@@ -10,10 +10,10 @@ import numpy as np
 
 from springtune.mechanics.statics import SingularError
 from springtune.problem.boundary import FACE_POSITIONS, check_case
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOAD_KINDS, Load
 from springtune.problem.materials import material_of
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
+from springtune.problem.shapes import Beam
 from springtune.reference.answers import field_error, interpolate
 from springtune.scene.boundary_problem import BeamProblem, ShapeProblem
 from springtune.scene.mesh_cache import MeshCache, definition_of, naming_errors

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from springtune.mesh.cells import Mesh
+from springtune.mesh.cells import MESH_TYPES, Mesh
 from springtune.mesh.formats import read_beam_mesh, read_stored, write_mesh
-from springtune.mesh.groups import GroupedMesh
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.sheets import GroupedMesh
 
 from ...runs import store
 from ...runs.attempts import RefusedError

@@ -5,7 +5,7 @@ import pandas as pd
 
 from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
-from springtune.problem.parameters import SWEPT
+from springtune.problem.quantities import SWEPT
 
 from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head

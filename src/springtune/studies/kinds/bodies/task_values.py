@@ -8,10 +8,9 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from springtune.mesh.formats import read_shape
-from springtune.mesh.groups import GroupedMesh
-from springtune.problem.geometry import AssumptionWarning
+from springtune.mesh.sheets import GroupedMesh
 from springtune.problem.materials import AnyMaterial, material_of
-from springtune.problem.shapes import LoadCase, Quantity, Shape
+from springtune.problem.shapes import AssumptionWarning, LoadCase, Quantity, Shape
 
 from .stored import check_unchanged
 
@@ -58,7 +57,7 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
 
 def make_shape(source: dict[str, Any]) -> GroupedMesh:
     """Mesh of a shape with its groups, generated or read from its ``file``."""
-    from springtune.mesh.outlines import mesh_shape  # here: most callers mesh nothing
+    from springtune.mesh.free import mesh_shape  # here: most callers mesh nothing
 
     if "file" in source:
         check_unchanged(source)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from springtune.problem.parameters import OF_BODIES, SWEPT
+from springtune.problem.quantities import OF_BODIES, SWEPT
 
 from ...config.kind import declared_variables
 from ...output.dataset import PARTICLE_ATTRIBUTES, SPRING_ATTRIBUTES, UGRID, Group

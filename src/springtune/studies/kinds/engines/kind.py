@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from springtune.mechanics import PRECISIONS
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.registry import import_name
 from springtune.springs.base import DEFINITIONS

@@ -5,9 +5,9 @@ from functools import lru_cache
 from springtune.engines.base import ENGINES, EngineAbsentError, EngineError
 from springtune.engines.run import in_engine
 from springtune.problem.compare import deformation_error
-from springtune.problem.geometry import Beam
 from springtune.problem.materials import material_of
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
+from springtune.problem.shapes import Beam
 from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.scene.meshes import make_mesh
 from springtune.scene.single import Scene

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from springtune.problem.geometry import Strip, Trapezoid
+from springtune.problem.shapes import Strip, Trapezoid
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields

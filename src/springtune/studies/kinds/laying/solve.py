@@ -19,12 +19,11 @@ import numpy as np
 
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle
 from springtune.mechanics.network import FollowerPressure
-from springtune.mesh.cells import Mesh
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES, Mesh
 from springtune.problem.compare import band
-from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import material_of
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
+from springtune.problem.shapes import Strip, Trapezoid
 from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 

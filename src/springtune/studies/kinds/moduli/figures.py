@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from springtune.safe_io.escapes import no_mathematics
+from springtune.safe_io.texts import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import most_requested

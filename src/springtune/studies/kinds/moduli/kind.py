@@ -4,8 +4,8 @@ from itertools import product
 
 from pydantic import Field
 
-from springtune.mesh.types import MESH_TYPES
-from springtune.problem.geometry import Beam
+from springtune.mesh.cells import MESH_TYPES
+from springtune.problem.shapes import Beam
 from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles

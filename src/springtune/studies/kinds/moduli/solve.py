@@ -1,7 +1,7 @@
 """Stage `moduli`: effective moduli of definitions on patches, for E = 1 and t = 1."""
 
 from springtune.problem.materials import InPlane, Material
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 from springtune.scene.sheet import MeshModuli
 from springtune.springs.base import DefinitionError
 

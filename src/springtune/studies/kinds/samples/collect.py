@@ -9,7 +9,7 @@ import pandas as pd
 
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 from springtune.reference.answers import unit_scales
 from springtune.springs.lattice import COEFFICIENT
 

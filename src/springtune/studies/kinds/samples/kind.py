@@ -5,10 +5,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, WithJsonSchema, create_model
 
-from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
-from springtune.problem.parameters import MOST_SCENES
-from springtune.safe_io.tables import number_text
+from springtune.problem.quantities import MOST_SCENES
+from springtune.problem.shapes import warn_of_size, warn_of_thickness
+from springtune.safe_io.texts import number_text
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields

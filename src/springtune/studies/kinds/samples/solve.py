@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Material
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from springtune.mechanics import BEHAVIOURS
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES
 
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_density, check_particles

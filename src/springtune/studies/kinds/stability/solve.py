@@ -14,13 +14,12 @@ from springtune.mechanics.continuation import follow
 from springtune.mechanics.continuum import PatchTest
 from springtune.mechanics.dynamics import Motion, relax
 from springtune.mechanics.statics import SingularError, StaticProblem
-from springtune.mesh.cells import Mesh, corner_angles
-from springtune.mesh.types import MESH_TYPES
+from springtune.mesh.cells import MESH_TYPES, Mesh, corner_angles
 from springtune.problem.boundary import weights
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, FACE
 from springtune.problem.materials import Material, material_of
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
+from springtune.problem.shapes import Beam
 from springtune.scene.mesh_cache import MeshCache
 from springtune.scene.motion import motion_of
 from springtune.springs.base import DefinitionError, Springs

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springtune.problem.compare import error_text
-from springtune.problem.status import Status
+from springtune.problem.quantities import Status
 
 from ..answers import (
     Columns,

@@ -22,7 +22,7 @@ import numpy as np
 import yaml
 from markupsafe import Markup
 
-from springtune.safe_io.atomic import write_json, write_text
+from springtune.safe_io.files import write_json, write_text
 
 from ...config.kind import VIEWS, kind_files
 from .. import reading
