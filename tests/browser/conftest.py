@@ -12,7 +12,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
 import springtune as st
-from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import STATUS
 

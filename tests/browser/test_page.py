@@ -12,7 +12,7 @@ from selenium.webdriver.common.by import By
 
 from conftest import written
 from springtune.problem.compare import sign_sentence
-from springtune.studies.kinds.bodies.variables import ROOT
+from springtune.studies.kinds.bodies.collect import ROOT
 
 from synthetic import LABELS, dataset
 

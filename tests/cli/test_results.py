@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
 from springtune.studies.output import dataset, export
 
 from synthetic import SMALL_AXES as AXES

@@ -8,7 +8,7 @@ import xarray as xr
 import yaml
 
 import springtune as st
-from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
 from springtune.studies.output import dataset as stored
 
 GIVEN = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text())

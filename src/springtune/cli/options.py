@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
     from ..problem.shapes import Shape
     from ..studies.config.model import Study
-    from ..studies.kinds.bodies.shape_expand import Shapes
+    from ..studies.kinds.bodies.shapes import Shapes
 
 
 @contextmanager

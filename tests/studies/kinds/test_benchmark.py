@@ -8,9 +8,8 @@ from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.studies.kinds.benchmark import OTHER_APPROACHES, approach_names
 from springtune.studies.kinds.benchmark import solve as benchmark
-from springtune.studies.kinds.benchmark.approaches import APPROACHES
 from springtune.studies.kinds.benchmark.kind import KIND
-from springtune.studies.kinds.benchmark.solve import LoadedBeam
+from springtune.studies.kinds.benchmark.solve import APPROACHES, LoadedBeam
 from springtune.studies.kinds.collect import group_of
 
 from tables import beside, cases

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.studies.kinds.bodies import plan
+from springtune.studies.kinds.bodies import kind as bodies
 from springtune.studies.kinds.bodies.tables import like_with_like
 from springtune.studies.kinds.moduli.outputs import tables
 from springtune.studies.runs.provenance import inputs
@@ -52,9 +52,9 @@ def test_a_test_is_part_of_the_keys_of_what_is_stored(here):
 
     def keys(text=STUDY):
         found = study(text)
-        tasks = [task for tasks in plan.scene_tasks(found).values() for task in tasks]
+        tasks = [task for tasks in bodies.scene_tasks(found).values() for task in tasks]
         scenes = {task["key"] for task in tasks if task["material"].get("coefficients")}
-        return scenes | {plan.finite_key(one, "yeoh-plane-stress") for one in found.references[:1]}
+        return scenes | {bodies.finite_key(one, "yeoh-plane-stress") for one in found.references[:1]}
 
     first, file = keys(), here / "uniaxial.csv"
     file.write_text("# read again\n" + file.read_text())

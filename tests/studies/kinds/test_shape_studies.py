@@ -13,8 +13,8 @@ from springtune.cli import main
 from springtune.mesh.formats import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
-from springtune.studies.kinds.bodies.plan import shape_mesh_keys, shape_reference_task, shape_scene_task
-from springtune.studies.kinds.bodies.shape_expand import LARGEST_FILE_CHECKED
+from springtune.studies.kinds.bodies.kind import shape_mesh_keys, shape_reference_task, shape_scene_task
+from springtune.studies.kinds.bodies.shapes import LARGEST_FILE_CHECKED
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.runs.rerun import output_files

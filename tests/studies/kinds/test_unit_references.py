@@ -7,9 +7,8 @@ import yaml
 import springtune as st
 from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.kinds.bodies import any_reference, collect
-from springtune.studies.kinds.bodies import plan as bodies_plan
-from springtune.studies.kinds.bodies.kind import summary
-from springtune.studies.kinds.bodies.plan import interpolants, reference_of, solved_reference
+from springtune.studies.kinds.bodies import kind as bodies
+from springtune.studies.kinds.bodies.kind import interpolants, reference_of, solved_reference, summary
 from springtune.studies.runs import store
 from springtune.studies.runs.plan import plan
 
@@ -21,7 +20,7 @@ MANY, FEW = 32, 20
 
 @pytest.fixture(autouse=True)
 def few_alone(monkeypatch):
-    monkeypatch.setattr(bodies_plan, "MOST_SOLVED_ALONE", 25)
+    monkeypatch.setattr(bodies, "MOST_SOLVED_ALONE", 25)
 
 
 def text(lengths, outputs=("size",), definition="lattice"):

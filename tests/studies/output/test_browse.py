@@ -15,7 +15,7 @@ import springtune as st
 from springtune.cli import main
 from springtune.problem.quantities import Status
 from springtune.studies.config.kind import kinds
-from springtune.studies.kinds.bodies.variables import ROOT
+from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.samples.designs import PARAMETERS
 from springtune.studies.output.browse.page import packed, page, views

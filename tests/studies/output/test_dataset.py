@@ -11,7 +11,7 @@ import springtune as st
 from cf import complaints
 from springtune.registry import import_name
 from springtune.studies.config.kind import modules
-from springtune.studies.kinds.bodies.variables import ROOT, SENSITIVITY
+from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK_BYTES, Group
 from springtune.studies.runs import provenance
@@ -25,7 +25,7 @@ VERSION = {"springtune_version": "0"}
 
 GROUPS = {
     f"{name.split('.')[2]}{group.name}": group
-    for name in modules("variables", "collect")
+    for name in modules("collect")
     for group in vars(import_name(name)).values()
     if isinstance(group, Group)
 }

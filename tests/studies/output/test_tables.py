@@ -9,7 +9,7 @@ import xarray as xr
 from springtune.problem.compare import assured
 from springtune.studies.kinds.benchmark import outputs as benchmark
 from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
-from springtune.studies.kinds.bodies.variables import ROOT
+from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.moduli import outputs as definitions
 from springtune.studies.kinds.moduli.kind import KIND as MODULI

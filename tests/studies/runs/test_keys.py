@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import springtune as st
-from springtune.studies.kinds.bodies.plan import NOT_OF_BEAMS
+from springtune.studies.kinds.bodies.kind import NOT_OF_BEAMS, REFERENCES_OF_SHAPES
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
@@ -45,7 +45,8 @@ def test_no_module_imports_a_package_that_brings_in_others():
 
 @pytest.mark.parametrize("row", TABLES["closures"].values(), ids=TABLES["closures"])
 def test_a_module_counts_with_what_it_imports_and_with_nothing_else(row):
-    without = NOT_OF_BEAMS if row.get("without") == "beams" else tuple(row.get("without", ()))
+    known = {"beams": NOT_OF_BEAMS, "references of beams": REFERENCES_OF_SHAPES}
+    without = known.get(str(row.get("without")), tuple(row.get("without", ())))
     files = keys.closure(row["module"], without=without).files
     found = {path.relative_to(keys.PACKAGE).as_posix() for path in files}
     known = {*row.get("has", ())}
@@ -73,8 +74,9 @@ def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
 def _keys():
     forget_keys()
     found = {stage.module.removeprefix("studies.kinds."): keys.stage_key(stage.module) for stage in stages()}
-    of_beams = ("studies.kinds.bodies.shape_reference", "reference.finite_strain", "reference.interpolant")
+    of_beams = (*REFERENCES_OF_SHAPES, "reference.finite_strain", "reference.interpolant")
     found["unit"] = keys.stage_key("studies.kinds.bodies.reference", without=of_beams)
+    found["samples.interpolate"] = keys.stage_key("studies.kinds.samples.interpolate", without=of_beams)
     found["box"] = keys.stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
     found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=NOT_OF_BEAMS)
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}

@@ -12,7 +12,7 @@ import xarray as xr
 import springtune as st
 from counting import counted
 from springtune.studies.kinds import collect
-from springtune.studies.kinds.bodies import plan
+from springtune.studies.kinds.bodies import kind as bodies
 from springtune.studies.output import page
 from springtune.studies.runs import rerun, store
 
@@ -78,7 +78,7 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
         noted = {name: [job.stage.name, job.digest] for name, job in jobs.items() if job.stage}
         Path("plan.json").write_text(json.dumps({"stages": noted}))
         tool.do_stages(config, "invent")
-        with counted(plan.hash_of, store.read) as count:
+        with counted(bodies.hash_of, store.read) as count:
             study = planned(config)[0]
             groups = collect.groups_of_study(study, jobs["collect"].folder)
         # One a scene; there are half as many curves, which are hashed twice, and some references.

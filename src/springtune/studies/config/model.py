@@ -166,7 +166,7 @@ class Study:
 
     @property
     def shapes(self) -> Any:
-        """Shapes of the study, `springtune.studies.kinds.bodies.shape_expand.Shapes`, or None."""
+        """Shapes of the study, `springtune.studies.kinds.bodies.shapes.Shapes`, or None."""
         return self.parts["bodies"]["shapes"] if self.parts["bodies"] else None
 
     def material(self, name: str) -> AnyMaterial:

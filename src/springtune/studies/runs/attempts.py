@@ -42,7 +42,9 @@ TRACEBACKS = 3
 
 LONGEST_KEY = 4096
 
-Task = Mapping[str, Any]
+Values = Mapping[str, Any]
+"""Values of a task and its key."""
+
 Result = dict[str, Any]
 
 
@@ -138,8 +140,8 @@ def solve_files(module: ModuleType, content: dict[str, Any], attempts: Attempts)
 
 def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any], attempts: Attempts) -> None:
     path = Path(content["folder"]) / f"{file['name']}.h5"
-    failed: Callable[[Task, str], Result] = getattr(module, "failed", _failed)
-    parts: Callable[[Task, Result], dict[str, Result]] = getattr(module, "parts", _one_part)
+    failed: Callable[[Values, str], Result] = getattr(module, "failed", _failed)
+    parts: Callable[[Values, Result], dict[str, Result]] = getattr(module, "parts", _one_part)
     present = store.stored_keys(path)
     tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
     missing = [task for task in tasks if not parts(task, {}).keys() <= present]
@@ -165,9 +167,9 @@ def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any
                     keeper[key] = part
 
 
-def _failed(task: Task, why: str) -> Result:
+def _failed(task: Values, why: str) -> Result:
     return {"status": Status.FAILED, "message": why}
 
 
-def _one_part(task: Task, result: Result) -> dict[str, Result]:
+def _one_part(task: Values, result: Result) -> dict[str, Result]:
     return {task["key"]: result}

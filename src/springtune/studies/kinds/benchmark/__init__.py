@@ -15,7 +15,7 @@ OTHER_APPROACHES = (
     "calculix-cps3",
     "calculix-cps8",
 )
-"""Approaches of the benchmark besides definitions, see `springtune.studies.kinds.benchmark.approaches`."""
+"""Approaches of the benchmark besides definitions, see `springtune.studies.kinds.benchmark.solve`."""
 
 PARTS = ("meshing", "assembling", "factorizing", "solving")
 """Timed parts of a case."""

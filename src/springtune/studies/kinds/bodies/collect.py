@@ -1,7 +1,9 @@
-"""Groups of a dataset of beams, in the root, and of shapes."""
+"""Groups of a dataset of beams, in the root, and of shapes; ``collect.csv`` declares their variables."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -10,19 +12,114 @@ from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
-from springtune.problem.quantities import Status
+from springtune.problem.quantities import OF_BODIES, SWEPT, Status
 from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
+from ...config.kind import declared_variables
 from ...config.model import Reference, keeps_fields
-from ...output.dataset import NO_NODE
+from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SPRING_ATTRIBUTES, UGRID, Group
 from ...output.selection import SHOWN_PREFIX
 from ...runs import store
-from . import any_reference, plan, stored, variables
-from .outputs import CASE_AXES, MESH_AXES, SHAPES_OUTPUT, pressed
+from . import any_reference, stored
+from . import kind as bodies
+from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, pressed
 from .stored import FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
+
+if TYPE_CHECKING:
+    from ...config.model import Study
+
+MESH = ("beam", "mesh_type", "mesh_size")
+REFERENCE = ("beam", "material", "load")
+CELL = (*MESH, "material", "load")
+CURVE = (*CELL, "kinematics")
+SCENE = (*CELL, "definition", "kinematics")
+
+DIMENSIONS = {"MESH": MESH, "REFERENCE": REFERENCE, "CELL": CELL, "CURVE": CURVE, "SCENE": SCENE}
+DIMENSIONS |= {"SHAPE_MESH": MESH_AXES, "SHAPE_CASE": CASE_AXES, "SHAPE_SCENE": SCENE_AXES}
+"""Dimensions that the file gives one name."""
+
+
+def declared(group: str, **options: Any) -> Group:
+    """Group of the dataset with its variables from the file."""
+    return Group(group, declared_variables(__file__, group, **DIMENSIONS), **options)
+
+
+YES_OR_NO = {"applies": ("no", "yes")}
+MESH_ATTRIBUTES = (
+    UGRID
+    | dict.fromkeys(("displacement_x", "displacement_y"), PARTICLE_ATTRIBUTES)
+    | {"spring_force": SPRING_ATTRIBUTES}
+)
+KIND_OF_REFERENCE = {"reference": "kind of reference"}
+
+ROOT = declared("/", flags=YES_OR_NO)
+SENSITIVITY = declared("/sensitivity", dimensions={"stiffness_ratio": "uniform stiffness over E t"})
+FINITE_STRAIN = declared("/finite_strain", dimensions=KIND_OF_REFERENCE)
+BLOCK = declared("/block", dimensions=KIND_OF_REFERENCE | {"face_position": "place on the loaded face over its length"})
+FIELDS = declared(
+    "/fields",
+    further=MESH_ATTRIBUTES
+    | dict.fromkeys(("particle_reference_x", "particle_reference_y"), PARTICLE_ATTRIBUTES)
+    | {"stiffness": SPRING_ATTRIBUTES},
+)
+"""Whole fields of the coarsest mesh of each beam and mesh type, by UGRID-1.0 without the padding of its arrays.
+
+The force of springs is not called "force", a dimension of the root where a study sweeps it.
+"""
+
+MIXED_UNITS: dict[str, object] = {
+    "comment": "in SI units: quantity_units says which",
+    "units_variable": "quantity_units",
+}
+
+SHAPES = declared(
+    "/shapes",
+    dimensions={"shape": "shape, by name", "quantity": "quantity of interest, by name"},
+    flags=YES_OR_NO,
+    further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED_UNITS),
+)
+AT_FINITE_STRAIN = declared(
+    "/shapes_finite_strain",
+    dimensions=SHAPES.dimensions
+    | {"law": "law at finite strain: that of the material, or of St. Venant and Kirchhoff"},
+    further={"reference_value": MIXED_UNITS},
+)
+SHAPE_FIELDS = declared("/shape_fields", dimensions={"case": "shape and load"}, further=MESH_ATTRIBUTES)
+"""Networks to draw: of each shape and load on one mesh, displacements and forces with seven digits."""
+
+PRINTED_PREFIX = "paper_"
+"""Prefix of variables of printed cells, which have no swept dimensions."""
+
+
+def swept(group: Group, study: "Study") -> Group:
+    """Group whose variables also have the swept dimensions that they depend on."""
+    further: dict[str, list[str]] = {}
+    for name, (dimensions, *_) in group.variables.items():
+        if name in OF_BODIES.values():
+            further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
+        elif "load" in dimensions and not name.startswith(PRINTED_PREFIX):
+            further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
+    found = group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
+    if group in (ROOT, FINITE_STRAIN, BLOCK) and study.plane_strain:
+        row = ("material",), "1", "plane of the material, 'stress' or 'strain'; its constants are those in 3-D", ""
+        found = replace(found, variables=found.variables | {"material_plane": row})
+    return found
+
+
+def fields_of(study: "Study") -> Group:
+    """Group of whole fields, which are stored for one value of each swept parameter: the group says which."""
+    place = "beam", "mesh_type", "material", "load"
+    swept = {
+        f"{SHOWN_PREFIX}{name}": (place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan)
+        for name in study.swept
+    }
+    return replace(FIELDS, variables=FIELDS.variables | swept)
+
+
+# -- rows --------------------------------------------------------------------------------------------------------------
 
 FACE_VARIABLES = {
     "displacement": "face_displacement",
@@ -96,28 +193,28 @@ def _beam_groups(study, folder):
     answers = {one: read(one.beam, one.material, one.load) for one in study.references}  # for 1 N: each is read once
     planes = [{"material": one.name, "material_plane": one.plane} for one in {one.material for one in answers}]
     cells, faces, fields = _scene_rows(study, folder, answers)
-    meshes = [mesh.labels | stored.read_notes(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes]
+    meshes = [mesh.labels | stored.read_notes(folder / "meshes", bodies.stem(mesh)) for mesh in study.meshes]
     rows = [*planes, *_body_rows(study), *meshes, *_reference_rows(study, answers), *cells, *_printed_rows(study)]
-    data = variables.swept(variables.ROOT, study).of_rows(axes, rows)
+    data = swept(ROOT, study).of_rows(axes, rows)
     _comment(data, answers)
     _write_errors(data.deformation_error, data.displacement, data.reference_displacement)
     found = {"/": data}
     if study.curves:
-        group = variables.swept(variables.SENSITIVITY, study)
+        group = swept(SENSITIVITY, study)
         found["/sensitivity"] = group.of_rows(axes, _curve_rows(study, folder, answers))
     if study.further_references:
-        rows, group = [*planes, *_finite_reference_rows(study, folder)], variables.swept(variables.FINITE_STRAIN, study)
+        rows, group = [*planes, *_finite_reference_rows(study, folder)], swept(FINITE_STRAIN, study)
         finite = found["/finite_strain"] = group.of_rows(axes | {"reference": study.further_references}, rows)
         _write_errors(finite.deformation_error, data.displacement, finite.reference_displacement)
     if pressed(study):
-        kinds, group = (_small_strain_name(study), *study.further_references), variables.swept(variables.BLOCK, study)
+        kinds, group = (_small_strain_name(study), *study.further_references), swept(BLOCK, study)
         rows = [*planes, *_face_reference_rows(study, folder, kinds), *faces]
         own = {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}
         block = found["/block"] = group.of_rows(axes | own, rows)
         _write_errors(block.face_error, block.face_displacement, block.reference_face_displacement)
     if keeps_fields(study):
         rows = [*fields, *_rest_rows(study, folder)]
-        found["/fields"] = _fields_of_rows(variables.fields_of(study), axes, rows)
+        found["/fields"] = _fields_of_rows(fields_of(study), axes, rows)
     return found
 
 
@@ -169,7 +266,7 @@ def _reference_rows(study, answers):
 
 
 def _reference(study, folder, one, fields=()):
-    reference = plan.reference_of(study, one.beam, one.material, one.load)
+    reference = bodies.reference_of(study, one.beam, one.material, one.load)
     return any_reference.read(folder / "references", reference, fields)
 
 
@@ -183,17 +280,17 @@ def _scene_rows(study, folder, answers):
     }
     calibration = stored.read_calibration(folder)
     cells, faces, fields = [], [], []
-    for mesh, tasks in plan.scene_tasks(study).items():
+    for mesh, tasks in bodies.scene_tasks(study).items():
         keys = [stored_key(task, calibration) for task in tasks]
-        path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
+        path = folder / "solutions" / f"{bodies.stem(mesh)}.h5"
         results = store.read(path, set(keys), ["face_profile"] if pressed(study) else [])
         kept = {fields_key(key) for task, key in zip(tasks, keys) if keeps_fields(study) and "keep_fields" in task}
         arrays = store.read(path, kept, [*FIELD_ARRAYS]) if kept else {}
-        for scene, key in zip(plan.scenes_by_mesh(study)[mesh], keys):
+        for scene, key in zip(bodies.scenes_by_mesh(study)[mesh], keys):
             result, labels = results[key], study.labels(scene)
             against = objections[*(labels[name] for name in names), scene.kinematics]
             message = _with_objection(result, result.get("message", ""), against)
-            # Names of the result that variables.csv declares, as `displacement`, become variables; others are left out.
+            # Names of the result that collect.csv declares, as `displacement`, become variables; others are left out.
             cells.append(result | labels | {"message": message, "solve_seconds": result["seconds"]})
             if LOADS[scene.load].kind.pressed:
                 faces.append(labels | {new: result[old] for old, new in FACE_VARIABLES.items() if old in result})
@@ -205,17 +302,17 @@ def _scene_rows(study, folder, answers):
 def _printed_rows(study):
     """Rows of the paper's printed cells that the study has."""
     for cell in study.printed:
-        labels = {name: getattr(cell, name) for name in variables.CELL}
+        labels = {name: getattr(cell, name) for name in CELL}
         if all(label in study.axes[name] for name, label in labels.items()):
-            own = (name for name in variables.ROOT.variables if name.startswith(variables.PRINTED_PREFIX))
-            yield labels | {name: getattr(cell, name.removeprefix(variables.PRINTED_PREFIX)) for name in own}
+            own = (name for name in ROOT.variables if name.startswith(PRINTED_PREFIX))
+            yield labels | {name: getattr(cell, name.removeprefix(PRINTED_PREFIX)) for name in own}
 
 
 def _curve_rows(study, folder, answers):
     """Rows of sensitivity curves."""
-    for mesh, curves in plan.curves_by_mesh(study).items():
-        tasks = [plan.curve_task(study, curve) for curve in curves]
-        path = folder / "curves" / f"{plan.stem(mesh)}.h5"
+    for mesh, curves in bodies.curves_by_mesh(study).items():
+        tasks = [bodies.curve_task(study, curve) for curve in curves]
+        path = folder / "curves" / f"{bodies.stem(mesh)}.h5"
         results = store.read(path, [task["key"] for task in tasks], ["displacement", "stable"])
         for curve, task in zip(curves, tasks):
             result, reference = results[task["key"]], Reference(mesh.beam, curve.material, curve.load, curve.force)
@@ -248,7 +345,7 @@ def _finite_reference_rows(study, folder):
 
 
 def _finite_reference(folder, one, kind, fields=()):
-    return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
+    return store.read_one(folder / "references", bodies.finite_key(one, kind), fields)
 
 
 def _write_errors(error, network, reference):
@@ -284,8 +381,8 @@ def _face_reference_rows(study, folder, kinds):
 
 def _rest_rows(study, folder):
     """Rows of meshes, and of outlines of references, for the scenes with stored fields."""
-    shown = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
-    meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
+    shown = [scene for scene in study.scenes if scene in bodies.shown_scenes(study)]
+    meshes = {mesh: stored.read(folder / "meshes", bodies.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
     yield from (mesh.labels | _mesh_row(found.mesh) for mesh, found in meshes.items() if found)
     outlined = set()  # scenes differ in their meshes and definitions
     for scene in shown:
@@ -309,7 +406,7 @@ def _shape_groups(study, folder):
     shapes = study.shapes
     answers = {case: _shape_reference(study, folder, *case) for case in shapes.referred}
     rows = [*_quantity_rows(shapes), *_shape_reference_rows(study, answers), *_shape_scene_rows(study, folder, answers)]
-    data = variables.SHAPES.of_rows(study.axes, rows)
+    data = SHAPES.of_rows(study.axes, rows)
     found = {"/shapes": data}
     if shapes.finite:
         found["/shapes_finite_strain"] = _shapes_at_finite_strain(study, folder, data.value)
@@ -320,7 +417,7 @@ def _shape_groups(study, folder):
 
 def _shape_reference(study, folder, *case, arrays=()):
     """Stored reference of a shape, material and load, and a law at finite strain if given."""
-    return store.read_one(folder / "references", plan.shape_reference_task(study, *case)["key"], arrays)
+    return store.read_one(folder / "references", bodies.shape_reference_task(study, *case)["key"], arrays)
 
 
 def _quantity_rows(shapes):
@@ -377,7 +474,7 @@ def _shapes_at_finite_strain(study, folder, values):
             error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
             rows.append(labels | {"error": error})
     laws = tuple(dict.fromkeys(law for *_, law in shapes.finite))
-    return variables.AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
+    return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
 def _reference_values(result, quantity):
@@ -389,10 +486,10 @@ def _reference_values(result, quantity):
 
 def _shape_scene_rows(study, folder, answers):
     """Rows of meshes and scenes."""
-    for file, scenes in plan.shape_scenes_by_mesh(study).items():
+    for file, scenes in bodies.shape_scenes_by_mesh(study).items():
         labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
         yield labels | stored.read_notes(folder / "meshes", file)
-        keys = {one: plan.shape_scene_task(study, one)["key"] for one in scenes}
+        keys = {one: bodies.shape_scene_task(study, one)["key"] for one in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
         for one, key in keys.items():
             reference = answers.get((one.shape, one.material, one.load))
@@ -423,16 +520,16 @@ def _error(value, reference):
 
 def _shape_fields(study, folder):
     """Group of the drawn networks."""
-    drawn, cases = plan.drawn_scenes(study), {}
+    drawn, cases = bodies.drawn_scenes(study), {}
     for one in (one for one in study.shapes.scenes if one in drawn):
         cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
     rows = [{"case": case} | row for case, scenes in cases.items() for row in _case_rows(study, folder, scenes)]
-    return _fields_of_rows(variables.SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
+    return _fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
 
 
 def _case_rows(study, folder, scenes):
     """Rows of a case: its labels, outline, mesh and networks."""
-    one, file = scenes[0], plan.shape_stem(scenes[0])
+    one, file = scenes[0], bodies.shape_stem(scenes[0])
     about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
     yield about | {"case_mesh_size": one.mesh_size}
     body = one.shape, one.material, one.load
@@ -446,7 +543,7 @@ def _case_rows(study, folder, scenes):
             yield rounds | _outline_row(found["outline_points"], found["outline_displacements"])
     if grouped := stored.read(folder / "meshes", file):
         yield _mesh_row(grouped.mesh)
-        keys = {scene: fields_key(plan.shape_scene_task(study, scene)["key"]) for scene in scenes}
+        keys = {scene: fields_key(bodies.shape_scene_task(study, scene)["key"]) for scene in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()), [*FIELD_ARRAYS])
         for scene, key in keys.items():
             if results[key]:

@@ -1,36 +1,514 @@
-"""Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``."""
+"""Bodies: the beams of a study's grids, and the shapes of its sections ``shapes`` and ``shape_grids``.
 
-from collections import Counter
+Stages, tasks and keys; `stored` reads what the stages store, and `collect` makes rows for the groups of the dataset.
+"""
+
+import hashlib
+from collections import Counter, defaultdict
+from functools import cache, lru_cache
+from math import ceil, floor, log10
+from operator import attrgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springtune.problem.loads import LOADS
 from springtune.problem.shapes import size_text
-from springtune.reference.answers import unit_problem
+from springtune.reference.answers import unit_problem, unit_scales
 from springtune.safe_io.texts import aligned
+from springtune.springs.base import DEFINITIONS
 
-from ...config.kind import StudyKind
-from ...config.model import SceneSpec, Study
-from .outputs import OUTPUTS, mesh_name, stems
-from .plan import STAGES, interpolants, reference_of
-from .shape_sections import SHAPE_GRIDS_KEY, SHAPES_KEY
+from ...config.kind import Stage, StudyKind
+from ...config.model import SceneSpec, Study, cache_by_study, keeps_fields, shown
+from ...runs import attempts
+from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...runs.plan import Task
+from ...runs.source import hash_of
+from . import shapes as of_shapes
+from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, mesh_name, stems
+from .stored import CALIBRATION_STEM
+
+if TYPE_CHECKING:
+    from springtune.problem.materials import Material
+    from springtune.problem.shapes import Beam
+
+    Body = tuple[Beam, Material, str]
+    Box = tuple[tuple[float, float], tuple[float, float]]
+
+
+def particles(area, mesh_size):
+    """Approximate number of particles of a mesh."""
+    return area / (0.866 * mesh_size**2)
+
+
+SEARCHED_DEFINITIONS = {"adjoint", "annealed", "evolved", "best-springs"}
+"""Definitions with a search, which takes about fifty times as long as the scene."""
+
+
+def expected_seconds(particles, definition=""):
+    """Expected seconds of a scene, a curve or a mesh."""
+    return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHED_DEFINITIONS else 1)
+
+
+def _group_by(items, key):
+    """Items grouped by a key, in order."""
+    groups = defaultdict(list)
+    for item in items:
+        groups[key(item)].append(item)
+    return dict(groups)
+
+
+@cache_by_study
+def scenes_by_mesh(study):
+    """Scenes of a study by their mesh."""
+    return _group_by(study.scenes, attrgetter("mesh"))
+
+
+@cache_by_study
+def curves_by_mesh(study):
+    """Sensitivity curves of a study by their mesh."""
+    return _group_by(study.curves, attrgetter("mesh"))
+
+
+@cache_by_study
+def shape_scenes_by_mesh(study):
+    """Scenes of shapes by the stem of their mesh."""
+    return _group_by(study.shapes.scenes if study.shapes else (), shape_stem)
+
+
+# -- references that are interpolated ----------------------------------------------------------------------------------
+#
+# An interpolant has no whole fields, so references that need them are solved one by one.
+
+MOST_SOLVED_ALONE = 100
+"""Unit problems of one kind of load that are solved one by one, some 3 s; more are interpolated."""
+
+ASPECT_STEPS_IN_DECADE = 10
+"""Possible ends of a range of aspect ratios in a decade. So new aspect ratios mostly need no new interpolant."""
+
+NU_STEP = 0.05
+"""Distance of possible ends of a range of Poisson's ratios [1]."""
+
+
+@cache_by_study
+def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
+    """Interpolants of a study by kind of load: box, and unit problem of each body in it."""
+    if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
+        return {}
+    wanted = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
+    if keeps_fields(study):
+        wanted += shown_scenes(study)
+    # Bodies and loads that share a unit problem share its solution, too.
+    whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}
+    kinds: dict[str, dict[Body, tuple[float, float]]] = {}
+    for body in dict.fromkeys((one.beam, one.material, one.load) for one in study.references):
+        beam, material, load = body
+        aspect_ratio, nu, kind = problem = unit_problem(beam, material, LOADS[load].kind)
+        if problem not in whole and kind.mirrored and -1 < nu <= 0.5:
+            kinds.setdefault(kind.name, {})[body] = aspect_ratio, nu
+    several = {name: own for name, own in kinds.items() if len({*own.values()}) > MOST_SOLVED_ALONE}
+    return {name: (box_of({*own.values()}), own) for name, own in several.items()}
+
+
+def box_of(problems: set[tuple[float, float]]) -> "Box":
+    """Box of aspect ratios and Poisson's ratios around unit problems, its ends rounded outwards.
+
+    >>> box_of({(1.5, 0.3), (5, 0.3)}), box_of({(2, -0.98), (2, 0.49)})
+    (((1.258925, 5.011872), (0.3, 0.3)), ((2.0, 2.0), (-0.98, 0.5)))
+    """
+    aspects, nus = ([float(one[axis]) for one in problems] for axis in range(2))
+    first, last, least, largest = min(aspects), max(aspects), min(nus), max(nus)
+    if first < last:
+        # An end that is one of the steps stays where it is, though its logarithm is rounded.
+        lower, upper = (ASPECT_STEPS_IN_DECADE * log10(end) for end in (first, last))
+        steps = floor(lower + 1e-5), ceil(upper - 1e-5)
+        lower, upper = (float(f"{10 ** (step / ASPECT_STEPS_IN_DECADE):.7g}") for step in steps)
+        first, last = min(first, lower), max(last, upper)
+    if least < largest:
+        steps = floor(least / NU_STEP + 1e-6), ceil(largest / NU_STEP - 1e-6)
+        below, above = (round(step * NU_STEP, 2) for step in steps)
+        least, largest = min(least, below) if below > -1 else least, min(max(largest, above), 0.5)
+    return (first, last), (least, largest)
+
+
+# -- keys --------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def mesh_key(mesh):
+    """Key of the mesh of a beam."""
+    code = stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
+    return hash_of(parameters(mesh_source(mesh)), code, mesh_type_key(mesh.mesh_type))
+
+
+def parameters(source):
+    """Parameters of a mesh for keys: of a file the ending, not the folder."""
+    return source | {"file": Path(source["file"]).suffix} if "file" in source else source
+
+
+def mesh_source(mesh):
+    """Parameters to make the mesh of a beam, from a box and mesh size or from a file."""
+    source = {"length": mesh.beam.length, "height": mesh.beam.height}
+    if mesh.file is None:
+        return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+    return source | file_source(mesh.file, mesh.unit)
+
+
+def file_source(file, unit):
+    """Parameters to read a mesh file: path, unit and hash of the content."""
+    state = Path(file).stat()
+    return {"file": str(file), "unit": unit, "content": _content(file, state.st_size, state.st_mtime_ns)}
+
+
+@lru_cache(maxsize=256)
+def _content(file, size, time):
+    """Hash of a file; cached by its state, since each scene asks."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+@cache
+def stem(mesh):
+    """Stem of a mesh's files; beams of one extent share it."""
+    extent = f"{1e3 * mesh.beam.length:.12g}x{1e3 * mesh.beam.height:.12g}"
+    own = f"_{mesh_source(mesh)['content'][:8]}" if mesh.file else ""
+    return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:.12g}mm{own}"
+
+
+def reference_of(study, beam, material, load):
+    """Argument of `any_reference.read` for the reference of a beam, material and load."""
+    solved = solved_reference(beam, material, load)
+    name = LOADS[load].kind.name
+    box, problems = interpolants(study).get(name, (None, {}))
+    if (beam, material, load) not in problems:
+        return solved
+    return solved | {"interpolant": interpolant_key(name, box), "problem": problems[beam, material, load]}
+
+
+REFERENCES_OF_SHAPES = (
+    "studies.kinds.bodies.task_values",
+    *("mesh.sheets", "reference.shapes", "reference.finite_shapes"),
+)
+"""Modules that the stage `reference` imports, but references of beams do not call."""
+
+
+def _reference_code(*without):
+    """Key of the code that solves references of beams."""
+    return stage_key("studies.kinds.bodies.reference", without=(*REFERENCES_OF_SHAPES, *without))
+
+
+NOT_OF_BEAMS = (
+    "studies.kinds.bodies.task_values",
+    *(f"reference.{name}" for name in ("small_strain", "shapes", "finite_shapes", "finite_strain")),
+)
+"""Modules that the stage `solve` imports, but scenes of beams do not call."""
+
+
+@cache
+def interpolant_key(kind, box):
+    """Key of an interpolant."""
+    return hash_of("interpolant", kind, box, _reference_code("reference.finite_strain"))
+
+
+@cache
+def solved_reference(beam, material, load):
+    """Key of the unit problem of a reference, and its scales."""
+    length, displacement = unit_scales(beam, material, LOADS[load].kind)
+    code = _reference_code("reference.finite_strain", "reference.interpolant")
+    key = hash_of(unit_problem_of(beam, material, load), code)
+    return {"key": key, "length": length, "displacement": displacement}
+
+
+def finite_key(reference, kind):
+    """Key of a reference at finite strain."""
+    return hash_of(finite_problem(reference, kind), _reference_code())
+
+
+def unit_problem_of(beam, material, load):
+    """Aspect ratio, Poisson's ratio and name of the kind of load of a beam's reference."""
+    aspect_ratio, nu, kind = unit_problem(beam, material, LOADS[load].kind)
+    return aspect_ratio, nu, kind.name
+
+
+def finite_problem(reference, kind):
+    """Task of a reference at finite strain."""
+    law, _, plane = kind.partition("-plane-")
+    load = LOADS[reference.load]
+    found = {"law": law, "plane": plane, "load": load.kind.name, "force": reference.force, "follower": load.follower}
+    return found | {"beam": beam_key(reference.beam), "material": material_key(reference.material)}
+
+
+@cache_by_study
+def scene_tasks(study):
+    """Tasks of a study's scenes by mesh; `stored.stored_key` adds the calibrated stiffness to their keys."""
+    return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in scenes_by_mesh(study).items()}
+
+
+def _scene_tasks(study, mesh, scenes):
+    shared, kept = {}, shown_scenes(study)
+    for scene in scenes:
+        place = scene.material, scene.load, scene.definition, scene.kinematics
+        if place not in shared:
+            shared[place] = _network_task(study, mesh, *place)
+        task, key = shared[place]
+        own = {"force": scene.force}
+        if scene.definition == "paper":
+            own["stiffness"] = study.stiffness_table[mesh.mesh_type, scene.material.name]
+        if scene.stiffness_scale != 1:
+            own["stiffness_scale"] = scene.stiffness_scale
+        further = {}
+        if scene.definition == "calibrated":  # stiffness is proportional to thickness
+            group = calibration_name(scene)
+            further["calibration"] = calibrations(study)[group].key
+            own["thickness_ratio"] = mesh.beam.thickness / calibrating(study)[group][0].mesh.beam.thickness
+        if scene in kept:
+            further["keep_fields"] = True
+        yield {**task, **own, **further, "key": hash_of(key, own)}
+
+
+def _network_task(study, mesh, material, load, definition, kinematics):
+    """Task and key that scenes of a mesh share which differ in force or stiffness only."""
+    task = {
+        "material": material_key(material),
+        "kind": LOADS[load].kind.name,
+        # In linear kinematics follower forces keep their initial direction.
+        "follower": LOADS[load].follower and kinematics == "nonlinear",
+        "definition": definition,
+        "kinematics": kinematics,
+    }
+    reference = reference_of(study, mesh.beam, material, load)
+    if "interpolant" not in reference:  # which has no field, all that a scene wants of it
+        task["reference"] = reference
+    code = stage_key("studies.kinds.bodies.solve", without=NOT_OF_BEAMS), definition_key(definition)
+    return task, hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
+
+
+def curve_task(study, curve):
+    """Task of a sensitivity curve; its stiffnesses [N/m] ascend."""
+    membrane = curve.material.in_plane.young_modulus * curve.mesh.beam.thickness
+    task = {
+        "kind": LOADS[curve.load].kind.name,
+        "force": curve.force,
+        "kinematics": curve.kinematics,
+        "stiffnesses": [ratio * membrane for ratio in study.stiffness_ratios],
+        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
+    }
+    return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.bodies.sensitivity"))} | task
+
+
+@cache_by_study
+def shown_scenes(study):
+    """Scenes with stored fields."""
+    return shown(study.scenes, study.swept)
+
+
+@cache_by_study
+def calibrating(study):
+    """Curves that calibrate each group of scenes."""
+    chosen = (one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration)
+    return _group_by(chosen, calibration_name)
+
+
+def calibration_name(scene):
+    """Name of the group of curves that calibrates a scene, or that has a curve."""
+    return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
+
+
+@cache_by_study
+def calibrations(study):
+    """Tasks of the calibrated stiffnesses by group, all in one job and file."""
+
+    def member(curve):
+        place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
+        return place | {"load": curve.load, "force": curve.force}
+
+    code, found = stage_key("studies.kinds.bodies.calibrate"), {}
+    for name in sorted({calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}):
+        members = [member(one) for one in calibrating(study)[name]]
+        found[name] = Task({"members": members}, name="all", file=CALIBRATION_STEM, key=hash_of(members, code))
+    return found
+
+
+# -- shapes ------------------------------------------------------------------------------------------------------------
+
+MOST_PARTICLES_DRAWN = 1500
+"""Approximate number of particles of the largest mesh that is drawn, if there is a coarser one."""
+
+FILE_PARTICLES = 2000.0
+"""Assumed number of particles of a mesh file, for expected seconds."""
+
+WITHOUT_FINITE_STRAIN = ("reference.finite_shapes", "reference.finite_strain")
+
+
+def shape_stem(one):
+    """Stem of the files of a scene of a shape."""
+    return f"shape_{mesh_name(one)}"
+
+
+def shape_particles(study, one):
+    """Approximate number of particles of a scene's mesh."""
+    shape = study.shape(one.shape)
+    return FILE_PARTICLES if shape.file else particles(shape.area, one.mesh_size)
+
+
+@cache_by_study
+def drawn_scenes(study):
+    """Scenes with drawn networks: of each shape and load the finest mesh that is not too large, and one material."""
+    found = set()
+    for scenes in _group_by(study.shapes.scenes, attrgetter("shape", "load")).values():
+        few = [one for one in scenes if shape_particles(study, one) <= MOST_PARTICLES_DRAWN]
+        size = attrgetter("mesh_size")
+        mesh = min(few, key=size) if few else max(scenes, key=size)
+        alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
+        found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
+    return found
+
+
+def shape_source(shape, file=""):
+    """Parameters of the geometry of a shape, or of one of its files."""
+    from .task_values import geometry  # here, as below: studies of beams read this module as well
+
+    return geometry(shape) | (file_source(file or shape.file, shape.unit) if shape.file else {})
+
+
+def shape_mesh_source(study, one):
+    """Parameters to make the mesh of a shape."""
+    source = shape_source(study.shape(one.shape), study.shapes.files[one.shape].get(one.mesh_size, ""))
+    if "file" in source:
+        return source
+    refined = {name: share * one.mesh_size for name, share in study.shapes.refined[one.shape].items()}
+    return source | {"mesh_size": one.mesh_size, "refined": refined}
+
+
+@cache_by_study
+def shape_mesh_keys(study):
+    """Keys of the meshes of shapes by their stem."""
+    code = stage_key("studies.kinds.bodies.mesh")
+    return {
+        name: hash_of(parameters(shape_mesh_source(study, one)), code, _reader_key(study.shape(one.shape)))
+        for name, (one, *_) in shape_scenes_by_mesh(study).items()
+    }
+
+
+def _reader_key(shape):
+    """Key of the code that reads the mesh file of a shape, or an empty string."""
+    return mesh_type_key(MESH_OF_FILE) if shape.file else ""
+
+
+@lru_cache(maxsize=1024)
+def _case_values(study, shape, material, name):
+    """Thickness, load and materials of a scene; with densities only under gravity."""
+    from .task_values import load
+
+    case, materials = study.shape(shape).loads[name], study.materials_of(shape, material)
+    weighs = any(case.gravity)
+    materials = {part: material_key(one, weighs) for part, one in materials.items()}
+    return {"thickness": study.shape(shape).thickness, "load": load(case), "materials": materials}
+
+
+def shape_reference_task(study, shape, material, name, law=""):
+    """Task of a reference of small strain, or of a law at finite strain."""
+    body = study.shape(shape)
+    task = {"shape": shape_source(body)} | _case_values(study, shape, material, name) | ({"law": law} if law else {})
+    without = "reference.interpolant", *(() if law else WITHOUT_FINITE_STRAIN)
+    code = stage_key("studies.kinds.bodies.reference", attempts.MODULE, without=without), _reader_key(body)
+    return {"key": hash_of(task | {"shape": parameters(task["shape"])}, code)} | task
+
+
+def shape_scene_task(study, one):
+    """Task of a scene of a shape."""
+    code = stage_key("studies.kinds.bodies.solve", without=WITHOUT_FINITE_STRAIN), definition_key(one.definition)
+    task = _case_values(study, one.shape, one.material, one.load)
+    task = task | {"definition": one.definition, "kinematics": one.kinematics}
+    key = hash_of(shape_mesh_keys(study)[shape_stem(one)], task, code)
+    kept = SHAPES_OUTPUT in study.outputs and one in drawn_scenes(study)
+    return {"key": key} | task | ({"keep_fields": True} if kept else {})
+
+
+# -- stages ------------------------------------------------------------------------------------------------------------
+
+
+def _mesh_task(name, source, key, particles, scenes, curves=()):
+    """Task of a mesh with the expected seconds of its scenes and curves."""
+    seconds = (1 + len(curves)) * expected_seconds(particles)
+    seconds += sum(expected_seconds(particles, scene.definition) for scene in scenes)
+    return Task(source, seconds=seconds, name=name, file=name, key=key)
+
+
+def _mesh_tasks(study):
+    curves = curves_by_mesh(study)
+    for mesh, scenes in scenes_by_mesh(study).items():
+        count, own = particles(mesh.beam.length * mesh.beam.height, mesh.mesh_size), curves.get(mesh, ())
+        yield _mesh_task(stem(mesh), mesh_source(mesh), mesh_key(mesh), count, scenes, own)
+    for name, scenes in shape_scenes_by_mesh(study).items():
+        source, count = shape_mesh_source(study, scenes[0]), shape_particles(study, scenes[0])
+        yield _mesh_task(name, source, shape_mesh_keys(study)[name], count, scenes)
+
+
+def _reference_tasks(study):
+    """Tasks of references and interpolants; references that share elements are in one job."""
+    found = {}
+    for one in study.references:
+        body = one.beam, one.material, one.load
+        if "interpolant" not in reference_of(study, *body):
+            problem, key = unit_problem_of(*body), solved_reference(*body)["key"]
+            name = hash_of(problem[0], problem[2])
+            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
+        for kind in study.further_references:
+            values, key = finite_problem(one, kind), finite_key(one, kind)
+            found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
+    yield from found.values()
+    for kind, (box, problems) in interpolants(study).items():
+        key = interpolant_key(kind, box)
+        keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+        values = {"kind": kind, "box": box, "problems": keys}
+        yield Task(values, seconds=10.0, name=key, key=key)
+    for one in (*study.shapes.referred, *study.shapes.finite) if study.shapes else ():
+        task = shape_reference_task(study, *one)
+        yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
+
+
+def _curve_tasks(study):
+    for mesh, curves in curves_by_mesh(study).items():
+        for task in (curve_task(study, one) for one in curves):
+            yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
+
+
+def _calibration_tasks(study):
+    return calibrations(study).values()
+
+
+def _solve_tasks(study):
+    for mesh, tasks in scene_tasks(study).items():
+        shared, name = {"beam": (mesh.beam.length, mesh.beam.height, mesh.beam.thickness)}, stem(mesh)
+        for task in tasks:
+            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
+    for name, scenes in shape_scenes_by_mesh(study).items():
+        shared = {"shape": parameters(shape_source(study.shape(scenes[0].shape)))}
+        for task in (shape_scene_task(study, one) for one in scenes):
+            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
+
+
+STAGES = (
+    Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
+    Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
+    Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh"),
+    Stage("calibrate", "studies.kinds.bodies.calibrate", _calibration_tasks, "curves"),
+    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh"),
+)
+
+
+# -- kind --------------------------------------------------------------------------------------------------------------
 
 
 def _check(config, problems):
-    if not (config.shapes or config.shape_grids):
-        return
-    from .shape_expand import check  # here, as below: most studies have no shapes
-
-    check(config, problems)
+    if config.shapes or config.shape_grids:
+        of_shapes.check(config, problems)
 
 
 def _expand(config, declared):
-    if not config.shape_grids:
-        return {"shapes": None}  # grids alone: an empty part would say that the study has no bodies
-    from .shape_expand import expand
-
-    return {"shapes": expand(config, declared)}
+    # Not an empty part, which would say that the study has no bodies.
+    return {"shapes": of_shapes.expand(config, declared) if config.shape_grids else None}
 
 
 def _axes(found):
@@ -82,7 +560,7 @@ def _files(found):
 
 KIND = StudyKind(
     "bodies",
-    study_fields={"shapes": SHAPES_KEY, "shape_grids": SHAPE_GRIDS_KEY},
+    study_fields={"shapes": of_shapes.SHAPES_KEY, "shape_grids": of_shapes.SHAPE_GRIDS_KEY},
     alone=("shape_grids",),
     reads=("grids",),
     files=_files,

@@ -14,7 +14,7 @@ from ...config.kind import Stage, StudyKind, declared_variables
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
-from ..bodies.plan import expected_seconds, mesh_key, mesh_source, parameters, particles
+from ..bodies.kind import expected_seconds, mesh_key, mesh_source, parameters, particles
 from .outputs import OUTPUTS
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ...runs.attempts import Attempts
-from ..bodies import unit_references
+from ..bodies.reference import make_interpolant
 from .designs import draw
 
 
@@ -16,9 +16,7 @@ def run(content: dict[str, Any], attempts: Attempts) -> None:
             drawn = draw(**file["sample"])
             pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
-        unit_references.make_interpolant(
-            Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, attempts
-        )
+        make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, attempts)
 
 
 def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:

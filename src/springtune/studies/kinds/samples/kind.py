@@ -19,6 +19,7 @@ from ...config.messages import OrSection, refuse, show, words
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import hash_of
+from ..bodies.kind import REFERENCES_OF_SHAPES
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
 from .outputs import OUTPUTS
 
@@ -277,7 +278,8 @@ def reference_box(sample):
 
 def reference_key(sample, kind):
     """Key of the interpolated references of a kind of load."""
-    code = stage_key(INTERPOLATE, without=("studies.kinds.samples.designs",))
+    other = *REFERENCES_OF_SHAPES, "reference.finite_strain", "studies.kinds.samples.designs"
+    code = stage_key(INTERPOLATE, without=other)
     return hash_of(kind.name, reference_box(sample), code)
 
 
