@@ -149,9 +149,10 @@ class ExtensibleMapping(Mapping[str, Entry]):
         return "; ".join(filter(None, map(self._tried.get, asked)))
 
     def __contains__(self, name: object) -> bool:
-        self._discover()
         if isinstance(name, str) and name not in self._entries:
-            self._load(name)
+            self._discover()
+            if name not in self._entries:
+                self._load(name)
         return isinstance(name, str) and name in self._entries
 
     def __getitem__(self, name: str) -> Entry:

@@ -182,7 +182,7 @@ def test_names_of_the_package_itself_are_followed(own):
     files = {path.name for path in own(text).files}
     assert "base.py" in files and not {"single.py", "__init__.py"} & files
     more = own(text.replace("1.0", "st.moduli(mesh, material, 'lattice').young_modulus_error"))
-    assert "moduli.py" in {path.name for path in more.files} and "scipy" in more.packages
+    assert "sheet.py" in {path.name for path in more.files} and "scipy" in more.packages
 
 
 def test_a_definition_that_was_typed_is_refused_with_the_remedy():

@@ -103,7 +103,7 @@ def declared(config: StudyConfig, problems: Problems) -> Declared:
     return Declared(beams, materials, problems.folder)
 
 
-def _ranks(config: StudyConfig) -> dict[str, dict[str, int]]:
+def _ranks(config: StudyConfig) -> dict[str, dict[Any, int]]:
     """Rank of each label, by dimension."""
     names: dict[str, Iterable[str]] = {
         "beam": config.beams,
@@ -228,9 +228,9 @@ def build(
     references = [Reference(one.mesh.beam, one.material, one.load, one.force) for one in loaded]
     ranks, names = _ranks(config), swept(config, references)
 
-    def order(item: Item) -> tuple[Any, ...]:
+    def order(item: Item) -> list[Any]:
         labels = item.labels | {"thickness": item.beam.thickness} if isinstance(item, MeshSpec) else item.labels(names)
-        return tuple([ranks[name][str(label)] if name in ranks else label for name, label in labels.items()])
+        return [ranks[name][label] if name in ranks else label for name, label in labels.items()]
 
     def in_order(items: Iterable[Item]) -> tuple[Item, ...]:
         return tuple(sorted(dict.fromkeys(items), key=order))

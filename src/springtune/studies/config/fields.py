@@ -49,7 +49,7 @@ Notes = tuple[Any, ...]
 class Section(BaseModel):
     """A mapping of known keys in a study; the docstring of a key is its meaning in the manual."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections import defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -58,7 +59,7 @@ class MeshSpec:
 MeshFiles = dict[tuple[str, str, float], MeshSpec]
 
 
-@dataclass(frozen=True)
+@dataclass
 class SceneSpec:
     """A boundary-value problem on one mesh, with tensile `force` [N] and a factor on all stiffnesses [1]."""
 
@@ -221,24 +222,18 @@ def keeps_fields(study: Study) -> bool:
     return "deformed" in study.outputs or "paraview" in study.outputs
 
 
-def shown(scenes: Collection[SceneSpec], swept: Iterable[str]) -> frozenset[SceneSpec]:
+def shown(scenes: Iterable[SceneSpec], swept: Iterable[str]) -> frozenset[SceneSpec]:
     """Scenes on the coarsest mesh, with one value of each swept parameter."""
-    names, coarsest = tuple(swept), dict[tuple[str, ...], float]()
+    names, bodies, found = tuple(swept), defaultdict[tuple[str, ...], list[SceneSpec]](list), set[SceneSpec]()
     for scene in scenes:
-        body, size = _body(scene), scene.mesh.mesh_size
-        if size >= coarsest.get(body, size):
-            coarsest[body] = size
-    # Few are on the coarsest mesh; only they are ranked.
-    ranked = [
-        (scene, body, [shown_order(name, swept_value(scene, scene.mesh.beam, name)) for name in names])
-        for scene in scenes
-        if scene.mesh.mesh_size == coarsest[body := _body(scene)]
-    ]
-    last: dict[tuple[str, ...], list[float]] = {}
-    for _, body, rank in ranked:
-        last[body] = max(last.get(body, rank), rank)
-    return frozenset(scene for scene, body, rank in ranked if rank == last[body])
-
-
-def _body(scene: SceneSpec) -> tuple[str, ...]:
-    return scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name, scene.load
+        bodies[scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name, scene.load].append(scene)
+    for own in bodies.values():
+        coarsest = max(scene.mesh.mesh_size for scene in own)
+        ranks = {
+            scene: [shown_order(name, swept_value(scene, scene.mesh.beam, name)) for name in names]
+            for scene in own
+            if scene.mesh.mesh_size == coarsest
+        }
+        last = max(ranks.values())
+        found |= {scene for scene, rank in ranks.items() if rank == last}
+    return frozenset(found)

@@ -1,6 +1,5 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
-import json
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -13,7 +12,7 @@ from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, Anisotropic
 
 from . import fields
 from .fields import Named, OneOrMore, Section, default, one_of
-from .kind import StudyKind, kinds
+from .kind import StudyKind
 from .messages import refuse, words
 
 
@@ -443,9 +442,3 @@ def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     model.alone = alone
     model.model_config["json_schema_extra"] = {"anyOf": [{"required": [key]} for key in ("grids", *alone)]}
     return model
-
-
-def schema_text() -> str:
-    """JSON schema of studies, for editors."""
-    schema = study_model(kinds()).model_json_schema()
-    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema"} | schema, indent=2) + "\n"

@@ -20,7 +20,7 @@ MOST_JOBS = 64
 """Most jobs of a stage."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Task:
     """A task of a stage; tasks of one name are in one bundle."""
 

@@ -56,7 +56,12 @@ _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 
 def hash_of(*parts: Any) -> str:
     """Hash values, independent of the order of keys."""
-    return hashlib.sha256(_ENCODER.encode(parts).encode()).hexdigest()[:24]
+    return hash_of_text(_ENCODER.encode(parts))
+
+
+def hash_of_text(text: str) -> str:
+    """Hash a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def read_note(path: Path) -> dict[str, Any]:

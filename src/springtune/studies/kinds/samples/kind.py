@@ -35,9 +35,6 @@ _NUMBERS: dict[str, Any] = {
 class DistributionConfig(Section):
     """The distribution to draw a parameter from; `parameter` adds its numbers."""
 
-    # Models that `parameter` makes have no source, and pydantic looks for it in all frames.
-    model_config = ConfigDict(use_attribute_docstrings=False)
-
     distribution: Annotated[str, *one_of("distribution", SHAPE_KEYS)] = "uniform"
 
 
