@@ -106,10 +106,10 @@ class Mesh:
     bonds: np.ndarray = field(default_factory=lambda: no_cells(2))
 
     def __post_init__(self) -> None:
-        points = _array(self.points, "points", 2, float)
-        object.__setattr__(self, "points", points)
-        for name, count in (("triangles", 3), ("quads", 4), ("bonds", 2)):
-            object.__setattr__(self, name, _array(getattr(self, name), name, count, np.int64))
+        for name, count in (("points", 2), ("triangles", 3), ("quads", 4), ("bonds", 2)):
+            kind = float if name == "points" else np.int64
+            object.__setattr__(self, name, _array(getattr(self, name), name, count, kind))
+        points = self.points
         lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(lost):
             raise MeshError(f"points: {len(lost)} are nowhere, the first one {lost[0]}; give finite coordinates in m")
@@ -139,22 +139,18 @@ class Mesh:
 
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
-        joins = [corners[:, SIDES[count] + DIAGONALS[count]] for count, corners in self.cells.items()]
-        bonds = [self.bonds] if len(self.bonds) else []
-        pairs = np.sort(np.concatenate([joined.reshape(-1, 2) for joined in joins] + bonds), axis=1)
+        joins = {count: corners[:, SIDES[count] + DIAGONALS[count]] for count, corners in self.cells.items()}
+        pairs = np.sort(np.concatenate([*(one.reshape(-1, 2) for one in joins.values()), self.bonds]), axis=1)
         # One integer per edge sorts ten times faster than rows do.
-        codes = pairs @ [len(self.points), 1]
-        codes, places, counts = np.unique(codes, return_inverse=True, return_counts=True)
-        if bonds:
-            places = places.ravel()[: len(pairs) - len(self.bonds)]
-            counts = np.bincount(places, minlength=len(codes))
+        codes, places = np.unique(pairs @ [len(self.points), 1], return_inverse=True)
+        places = places[: len(pairs) - len(self.bonds)]
+        counts = np.bincount(places, minlength=len(codes))
         edges = np.stack(np.divmod(codes, len(self.points)), axis=1)
         if counts.max() > 2:
             first = f"the edge of points {edges[np.argmax(counts)].tolist()} has {counts.max()} cells"
             raise MeshError(f"{first}, and a plane has two sides; remove some")
-        parts = np.split(places.ravel(), [joins[0].size // 2])
-        of_cells = {count: part.reshape(-1, joined.shape[1]) for count, joined, part in zip(self.cells, joins, parts)}
-        return edges, counts, of_cells
+        parts = np.split(places, [next(iter(joins.values())).size // 2])
+        return edges, counts, {count: part.reshape(one.shape[:2]) for (count, one), part in zip(joins.items(), parts)}
 
     def shares_cells(self, other: "Mesh") -> bool:
         """Return whether another mesh has the same cells; data that depend only on cells are then shared.
@@ -167,14 +163,11 @@ class Mesh:
         -------
         bool
         """
-        cells, others = self.cells, other.cells
-        same = len(self.points) == len(other.points) and cells.keys() == others.keys()
-        same = same and np.array_equal(self.bonds, other.bonds)
-        if same and all(np.array_equal(corners, others[count]) for count, corners in cells.items()):
-            self.__dict__.setdefault("_edges", other._edges)
-            self.__dict__.setdefault("on_outline", other.on_outline)
-            return True
-        return False
+        cells, others = ((one.triangles, one.quads, one.bonds) for one in (self, other))
+        same = len(self.points) == len(other.points) and all(map(np.array_equal, cells, others))
+        if same:
+            vars(self).update(_edges=other._edges, on_outline=other.on_outline)
+        return same
 
     @property
     def edges(self) -> np.ndarray:
@@ -329,6 +322,11 @@ def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return 0.5 * sum(x[i] * y[i + 1] - x[i + 1] * y[i] for i in range(len(x) - 1))
 
 
+def upright(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Cells with clockwise ones turned."""
+    return np.where((signed_areas(points, corners) < 0)[:, None], corners[:, ::-1], corners)
+
+
 def corner_angles(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Angle at each corner of each cell [rad], shape (n_cells, n_corners)."""
     x, y = (np.ascontiguousarray(along)[corners.T] for along in points.T)
@@ -429,11 +427,7 @@ MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type", "mesh_types"
 
 
 def mesh_type(
-    name: str,
-    *,
-    order: float = math.inf,
-    corners: int = 3,
-    row_height: float = 1.0,
+    name: str, *, order: float = math.inf, corners: int = 3, row_height: float = 1.0
 ) -> Callable[[Function], Function]:
     """Declare a function as a mesh type, by a decorator that returns it unchanged.
 

@@ -2,7 +2,6 @@
 
 import io
 import re
-from collections import defaultdict
 from contextlib import redirect_stderr
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,7 +12,7 @@ import numpy as np
 from ..registry import NAME, NAME_RULE
 from ..safe_io.files import DataElsewhere, bounded, check_alone, check_folder, replacing, why_unreadable
 from . import abaqus, gmsh
-from .cells import Mesh, MeshError, no_cells, signed_areas
+from .cells import Mesh, MeshError, no_cells, signed_areas, upright
 from .sheets import (
     COORDINATE_TOLERANCE,
     LINEAR_CELLS_REMEDY,
@@ -129,19 +128,21 @@ def _build_mesh(
     """Return the mesh of a file, and its particles' numbers in the file; `unit` in m."""
     if len(content.points) > most:
         raise MeshError(f"{path}: {len(content.points)} points, and at most {most} are read; write a coarser mesh")
-    cells: dict[int, list[np.ndarray]] = defaultdict(list)
-    for kind, corners in content.cells:
-        if CORNER_COUNTS[kind] > 2 and len(corners):
-            cells[CORNER_COUNTS[kind]].append(corners)
-    if not cells:
+    blocks = {n: [corners for kind, corners in content.cells if CORNER_COUNTS[kind] == n] for n in (3, 4)}
+    cells = {n: np.concatenate([no_cells(n), *found]).astype(np.int64) for n, found in blocks.items()}
+    if not any(map(len, cells.values())):
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
-    joined = {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
-    used = np.unique(np.concatenate([corners.ravel() for corners in joined.values()]))
+    used = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]))
     with np.errstate(over="ignore"):  # what is too far away is refused
         points = _read_points(path, unit * content.points, used)
-    for count, corners in joined.items():
-        joined[count] = _orient_cells(path, points, np.searchsorted(used, corners))
-    return Mesh(points, joined.get(3, no_cells(3)), joined.get(4, no_cells(4))), used
+    for count, corners in cells.items():
+        cells[count] = corners = upright(points, np.searchsorted(used, corners))
+        areas = signed_areas(points, corners)
+        flat = corners[areas <= 1e-12 * areas.max(initial=0.0)]
+        if len(flat):
+            first = in_words(points[flat[0]])
+            raise MeshError(f"{path}: cells with no area: {len(flat)}, the first one at {first}; remove them")
+    return Mesh(points, cells[3], cells[4]), used
 
 
 def _file_content(path: str | Path) -> Content:
@@ -229,34 +230,25 @@ def _by_meshio(found: Any) -> Content:
     content.cell_groups.update({name: [] for name in found.field_data if ":" not in name})
     dimensions = np.repeat([min(CORNER_COUNTS[kind] - 1, 2) for kind, _ in content.cells], np.diff(starts))
     names = {tuple(map(int, one)): name for name, one in found.field_data.items() if len(one) == 2}
-    for key, arrays in found.cell_data.items():
-        values = np.concatenate(arrays)
-        if key in NUMBER_KEYS and values.dtype.kind in "iu":
+    data = [(key, np.concatenate(arrays), content.cell_groups) for key, arrays in found.cell_data.items()]
+    data += [(key, np.asarray(values), content.point_groups) for key, values in found.point_data.items()]
+    for key, values, groups in data:
+        if groups is content.cell_groups and key in NUMBER_KEYS and values.dtype.kind in "iu":
             for tag, dimension in np.unique(np.stack([values, dimensions])[:, values != 0], axis=1).T.tolist():
                 name = names.get((tag, dimension), str(tag))
-                content.cell_groups[name].append(np.flatnonzero((values == tag) & (dimensions == dimension)))
-        else:
-            _add_marked(found, content, key, values, content.cell_groups)
-    for key, values in found.point_data.items():
-        _add_marked(found, content, key, np.asarray(values), content.point_groups)
+                groups[name].append(np.flatnonzero((values == tag) & (dimensions == dimension)))
+        elif values.ndim != 1 or values.dtype.kind not in "iub":
+            continue
+        elif key in MED_FAMILY_KEYS:
+            for tag, families in getattr(found, key, {}).items():
+                for name in families:
+                    groups[name].append(np.flatnonzero(values == tag))
+        elif ":" not in key and np.isin(values, (0, 1)).all() and values.any():
+            groups[key].append(np.flatnonzero(values))
+        elif ":" not in key:
+            what = "has other values than 0 and 1" if values.any() else "is 0 all over"
+            content.unusable[key] = f"{what} in the file; mark what belongs to it by 1"
     return content
-
-
-def _add_marked(
-    found: Any, content: Content, key: str, values: np.ndarray, groups: dict[str, list[np.ndarray]]
-) -> None:
-    """Add groups by data of cells or points: families of MED, or a mark."""
-    if values.ndim != 1 or values.dtype.kind not in "iub":
-        return
-    if key in MED_FAMILY_KEYS:
-        for tag, names in getattr(found, key, {}).items():
-            for name in names:
-                groups[name].append(np.flatnonzero(values == tag))
-    elif ":" not in key and np.isin(values, (0, 1)).all() and values.any():
-        groups[key].append(np.flatnonzero(values))
-    elif ":" not in key:
-        what = "has other values than 0 and 1" if values.any() else "is 0 all over"
-        content.unusable[key] = f"{what} in the file; mark what belongs to it by 1"
 
 
 def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.ndarray:
@@ -279,18 +271,6 @@ def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.n
     return points[:, :2].copy()
 
 
-def _orient_cells(path: str | Path, points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Corner indices of cells, clockwise ones turned; refused where cells have no area."""
-    areas = signed_areas(points, corners)
-    flat = np.abs(areas) <= 1e-12 * np.abs(areas).max()
-    if flat.any():
-        first = in_words(points[corners[flat][0]])
-        raise MeshError(f"{path}: cells with no area: {flat.sum()}, the first one at {first}; remove them")
-    clockwise = areas < 0
-    corners[clockwise] = corners[clockwise][:, ::-1]
-    return corners
-
-
 def read_beam_mesh(path: str | Path, length: float, height: float, unit: float = 1.0) -> Mesh:
     """Read a mesh that must fill a box, and move its lower left corner to the origin; lengths in m."""
     mesh = read_mesh(path, unit)
@@ -304,9 +284,8 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
         mesh = on_sides(mesh, box)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    wrong = box_fault(mesh)
-    if wrong:
-        raise MeshError(f"{path}: {wrong}")
+    if fault := box_fault(mesh):
+        raise MeshError(f"{path}: {fault}")
     return mesh
 
 
@@ -318,8 +297,7 @@ def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
     """
     content = _file_content(path)
     mesh, used = _build_mesh(path, content, unit)
-    fault = sheet_fault(mesh)
-    if fault:
+    if fault := sheet_fault(mesh):
         raise MeshError(f"{path}: {fault}")
     return _Groups(mesh, used, unit * content.points[:, :2]).grouped(content)
 
@@ -337,9 +315,7 @@ class _Groups:
         """Return the mesh with its groups, and the reasons why others are not usable."""
         sides, points, parts = {}, {}, {}
         unusable = dict(content.unusable)
-        for name in {**content.cell_groups, **content.point_groups}:
-            if name in unusable:
-                continue
+        for name in [one for one in {**content.cell_groups, **content.point_groups} if one not in unusable]:
             try:
                 lines, nodes, cells = self._members(name, content)
                 edges = self._sides(lines, nodes)
@@ -367,14 +343,13 @@ class _Groups:
         if len(chosen) and not 0 <= chosen.min() <= chosen.max() < len(mask):
             raise MeshError("has cells that are not in the file; remove these")
         mask[chosen] = True
-        cells = [(kind, corners, own) for (kind, corners), own in zip(content.cells, np.split(mask, starts[1:-1]))]
-        lines = [corners[own] for kind, corners, own in cells if kind == "line"]
-        vertices = [corners[own].ravel() for kind, corners, own in cells if kind == "vertex"]
-        masks = {
-            n: np.concatenate([own for kind, _, own in cells if CORNER_COUNTS[kind] == n]) for n in self.mesh.cells
-        }
-        edges = np.unique(np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]), axis=0)
-        nodes = np.unique(np.concatenate([[], *vertices, *content.point_groups.get(name, [])]).astype(np.int64))
+        blocks = [(CORNER_COUNTS[kind], cells) for kind, cells in content.cells]
+        cells = [(count, cells, own) for (count, cells), own in zip(blocks, np.split(mask, starts[1:-1]))]
+        masks = {n: np.concatenate([own for count, _, own in cells if count == n]) for n in self.mesh.cells}
+        vertices, lines = ([corners[own] for count, corners, own in cells if count == n] for n in (1, 2))
+        edges = np.unique(np.concatenate([no_cells(2), *lines]), axis=0)
+        points = [*map(np.ravel, vertices), *content.point_groups.get(name, [])]
+        nodes = np.unique(np.concatenate([[], *points]).astype(np.int64))
         if not NAME.fullmatch(name):
             raise MeshError(f"cannot be a name; {NAME_RULE}")
         if not mask.any() and not len(nodes):

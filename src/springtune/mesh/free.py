@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .cells import Mesh, MeshError, check_box, mesh_type, signed_areas, too_many
+from .cells import Mesh, MeshError, check_box, mesh_type, signed_areas, too_many, upright
 from .rows import ROW_HEIGHT
 from .sheets import GroupedMesh
 from .sides import OutlineSide, Point, nearer, winds_about
@@ -35,7 +35,7 @@ def triangulate(
     region_sizes: Mapping[int, float] | None = None,
     **options: float,
 ) -> Triangulation:
-    """Triangulate inside lines, by netgen's advancing front; triangles may be clockwise.
+    """Triangulate inside lines, by netgen's advancing front.
 
     `lines` are start, end, left and right domain. Lengths must be about 1: netgen's own tolerances are absolute.
     """
@@ -53,18 +53,14 @@ def triangulate(
         made = outline.GenerateMesh(**options)
     except NgException as error:
         raise MeshError(f"netgen cannot mesh {what}: {error}; {remedy}") from None
-    elements = made.Elements2D()
+    elements, placed = made.Elements2D(), np.array([point.p for point in made.Points()])[:, :2]
+    triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in elements], dtype=np.int64)
     return Triangulation(
-        np.array([point.p for point in made.Points()])[:, :2],
-        np.array([[vertex.nr - 1 for vertex in element.vertices] for element in elements], dtype=np.int64),
+        placed,
+        upright(placed, triangles.reshape(-1, 3)),
         np.array([element.index for element in elements], dtype=np.int64),
         [(one.index - 1, *(vertex.nr - 1 for vertex in one.points)) for one in made.Elements1D()],
     )
-
-
-def upright(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Triangles with clockwise ones turned."""
-    return np.where((signed_areas(points, triangles) < 0)[:, None], triangles[:, ::-1], triangles)
 
 
 @mesh_type("free", order=20, row_height=ROW_HEIGHT)
@@ -75,16 +71,13 @@ def free(length: float, height: float, size: float) -> Mesh:
     size = min(size, max(length, height))  # a side of less than an edge is one edge, and netgen bears no tiny boxes
     box = np.array([length, height]) / size
     corners = box * [(0, 0), (1, 0), (1, 1), (0, 1)]
-    lines = [(i, (i + 1) % 4, 1, 0) for i in range(4)]
-    made = triangulate(
-        corners, lines, f"{length:g} x {height:g} m at {size:g} m", "give another size", maxh=EDGE_FACTOR
-    )
+    lines, what = [(i, (i + 1) % 4, 1, 0) for i in range(4)], f"{length:g} x {height:g} m at {size:g} m"
+    made = triangulate(corners, lines, what, "give another size", maxh=EDGE_FACTOR)
     points = made.points
     for axis in range(2):
         points[np.abs(points[:, axis]) < 1e-9, axis] = 0.0
         points[np.abs(points[:, axis] - box[axis]) < 1e-9 * box[axis], axis] = box[axis]
-    points *= np.array([length, height]) / box
-    return Mesh(points, upright(points, made.triangles))
+    return Mesh(points * (np.array([length, height]) / box), made.triangles)
 
 
 LEAST_EDGES_A_TURN = 6
@@ -349,7 +342,7 @@ def _group_mesh(
         if region:
             parts[region] = parts.get(region, False) | (made.regions == number + 1)
     return GroupedMesh(
-        Mesh(made.points, upright(made.points, made.triangles)),
+        Mesh(made.points, made.triangles),
         {name: np.array(edges, dtype=np.int64) for name, edges in sides.items()},
         {name: np.array(point) for name, point in shape.points.items()},
         {name: {3: cells} for name, cells in parts.items()},

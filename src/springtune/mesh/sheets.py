@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
-from .sides import edge_in_words, in_words, nearer, winding
+from .sides import edge_in_words, in_words, nearer, turn, winding
 
 COORDINATE_TOLERANCE = 1e-6
 """Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
@@ -23,8 +23,7 @@ def sheet_fault(mesh: Mesh) -> str:
 
     Rounds of the outline must not touch themselves or each other: no slits, or cells that meet only in a point.
     """
-    fault = convexity_fault(mesh)
-    if fault:
+    if fault := convexity_fault(mesh):
         return fault
     outline, fault = outline_of(mesh)
     if fault:
@@ -51,10 +50,9 @@ def sheet_fault(mesh: Mesh) -> str:
         where = in_words(points[again[0]])
         return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
     for line in rounds(outline):
-        others = outline[~np.isin(outline[:, 0], line)]
-        x, y = (points[line] - points[line[0]]).T
-        outer = (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() > 0
-        if winding(points, others, points[line[0]]) != (0 if outer else 1):
+        start, end = points[outline[~np.isin(outline[:, 0], line)].T]
+        outer = turn(points[line[0]], points[line], np.roll(points[line], -1, axis=0)).sum() > 0
+        if winding(start, end, points[line[0]]) != (0 if outer else 1):
             return f"cells lie over each other at {in_words(points[line[0]])}; remove some"
     return ""
 
@@ -147,25 +145,22 @@ def box_fault(mesh: Mesh) -> str:
     >>> box_fault(Mesh(whole.points, whole.triangles[1:]))[:43]
     'its cells cover 99.375 % of the box or over'
     """
-    known: str | None = vars(mesh).get("_box_fault")
-    if known is None:
+    if "_box_fault" not in vars(mesh):
         low = mesh.points.min(axis=0)
         box = mesh.points.max(axis=0) - low
         moved = replace(mesh, points=mesh.points - low) if low.any() else mesh
         try:
-            known = _box_filling_fault(on_sides(moved, box), box)
+            fault = _box_filling_fault(on_sides(moved, box), box)
         except MeshError as error:
-            known = str(error)
-        vars(mesh)["_box_fault"] = known
-    return known
+            fault = str(error)
+        vars(mesh)["_box_fault"] = fault
+    return str(vars(mesh)["_box_fault"])
 
 
 def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:
     """Return why a mesh does not fill a box exactly once, without slits or holes, or an empty string."""
     share = mesh.area / box.prod()
-    lead = (
-        f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > COORDINATE_TOLERANCE else ""
-    )
+    wrong = abs(share - 1) > COORDINATE_TOLERANCE
     fault = sheet_fault(mesh)
     outline, _ = outline_of(mesh)
     ends = mesh.points[outline]
@@ -174,7 +169,7 @@ def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:
     if len(inside) and not fault:
         first = edge_in_words(mesh.points, inside[0])
         fault = f"edges inside the box with one cell only: {len(inside)}, the first one {first}; close the hole there"
-    return lead + fault if fault else ""
+    return f"its cells cover {100 * share:.6g} % of the box or overlap: {fault}" if fault and wrong else fault
 
 
 def connected(edges: np.ndarray, count: int) -> np.ndarray:
@@ -237,43 +232,28 @@ def bonded(mesh: Mesh, reach: float) -> Mesh:
     """Return a mesh with a bond between all points up to `reach` apart [m], but for those across its outline."""
     from scipy.spatial import cKDTree  # here, since studies are read without scipy
 
-    pairs = cKDTree(mesh.points).query_pairs(reach * (1 + 1e-9), output_type="ndarray")
-    known = mesh.edges @ [len(mesh.points), 1]
-    pairs = np.sort(pairs, axis=1)
-    pairs = pairs[~np.isin(pairs @ [len(mesh.points), 1], known)]
-    outline = mesh.points[mesh.edges[mesh.on_outline]]
+    pairs = np.sort(cKDTree(mesh.points).query_pairs(reach * (1 + 1e-9), output_type="ndarray"), axis=1)
+    pairs = pairs[~np.isin(pairs @ [len(mesh.points), 1], mesh.edges @ [len(mesh.points), 1])]
+    outline = mesh.points[outline_of(mesh)[0]]
     parts = np.array_split(pairs, 1 + len(pairs) // 1000)
     return replace(mesh, bonds=np.concatenate([part[_inside(mesh.points[part], outline)] for part in parts]))
 
 
 def _inside(bonds: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Mask of the bonds (n, 2, 2) that stay in a body or on its outline (m, 2, 2)."""
+    """Mask of the bonds (n, 2, 2) that stay in a body or on its outline (m, 2, 2), which has the body on its left."""
     a, b = bonds[:, None, 0], bonds[:, None, 1]
     c, d = outline[:, 0], outline[:, 1]
-
-    def turn(start: np.ndarray, end: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Twice the area of the triangle of three points."""
-        way, there = end - start, at - start
-        return np.asarray(way[..., 0] * there[..., 1] - way[..., 1] * there[..., 0])
-
     size = np.linalg.norm(d - c, axis=1)
     rounding = 1e-9 * size * np.linalg.norm(b - a, axis=2)
     # Sides that only touch do not cross: each end is clearly on its side of the other line.
-    crossed = (
-        (np.minimum(turn(c, d, a), turn(c, d, b)) < -rounding)
-        & (np.maximum(turn(c, d, a), turn(c, d, b)) > rounding)
-        & (np.minimum(turn(a, b, c), turn(a, b, d)) < -rounding)
-        & (np.maximum(turn(a, b, c), turn(a, b, d)) > rounding)
-    )
+    sides = np.sort([[turn(c, d, a), turn(c, d, b)], [turn(a, b, c), turn(a, b, d)]], axis=1)
+    crossed = ((sides[:, 0] < -rounding) & (sides[:, 1] > rounding)).all(axis=0)
     found: np.ndarray = ~crossed.any(axis=1)
     for share in (0.125, 0.375, 0.625, 0.875):  # a bond may also leave the body through a corner
         at = a + share * (b - a)
         within = np.linalg.norm(at - 0.5 * (c + d), axis=2) <= 0.5 * size * (1 + 1e-9)
         on_side = (np.abs(turn(c, d, at)) <= rounding) & within
-        # A ray from the point leaves the body through an odd number of sides.
-        rising = (c[:, 1] > at[..., 1]) != (d[:, 1] > at[..., 1])
-        right = (turn(c, d, at) > 0) == (d[:, 1] > c[:, 1])
-        found &= ((rising & right).sum(axis=1) % 2 == 1) | on_side.any(axis=1)
+        found &= (winding(c, d, at) != 0) | on_side.any(axis=1)
     return found
 
 
@@ -396,12 +376,10 @@ def parts_of(grouped: GroupedMesh) -> list[str]:
 
 def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
     """Return the part of each cell, by number of corners: ``""`` for the main part."""
-    found = {}
-    for count, corners in grouped.mesh.cells.items():
-        found[count] = np.full(len(corners), "", dtype=object)
-        for name, cells in grouped.parts.items():
-            if count in cells:
-                found[count][cells[count]] = name
+    found = {count: np.full(len(corners), "", dtype=object) for count, corners in grouped.mesh.cells.items()}
+    for name, cells in grouped.parts.items():
+        for count in found.keys() & cells:
+            found[count][cells[count]] = name
     return found
 
 

@@ -39,30 +39,31 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np
     return one, other, distances
 
 
+def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Twice the area of triangles of points (..., 2), negative where c is to the right of the way from a to b."""
+    way, there = b - a, c - a
+    return np.asarray(way[..., 0] * there[..., 1] - way[..., 1] * there[..., 0])
+
+
 def _edge_distances(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Distance of each edge from a to b from the one from c to d [m]."""
-
-    def left(one: np.ndarray, two: np.ndarray, three: np.ndarray) -> np.ndarray:
-        (x, y), (u, v) = (two - one).T, (three - one).T
-        return np.asarray(x * v - y * u)
 
     def away(point: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
         along = two - one
         share = np.clip(((point - one) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
         return np.asarray(np.linalg.norm(point - one - share[:, None] * along, axis=1))
 
-    crossing = (left(a, b, c) * left(a, b, d) < 0) & (left(c, d, a) * left(c, d, b) < 0)
+    crossing = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
     distance = np.min([away(a, c, d), away(b, c, d), away(c, a, b), away(d, a, b)], axis=0)
     return np.where(crossing, 0.0, distance)
 
 
-def winding(points: np.ndarray, edges: np.ndarray, point: np.ndarray) -> int:
-    """Return how often edges wind counter-clockwise about a point off them."""
-    start, end = points[edges[:, 0]] - point, points[edges[:, 1]] - point
-    left = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
-    up = (start[:, 1] <= 0) & (end[:, 1] > 0) & (left > 0)
-    down = (start[:, 1] > 0) & (end[:, 1] <= 0) & (left < 0)
-    return int(up.sum()) - int(down.sum())
+def winding(start: np.ndarray, end: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return how often edges from `start` to `end` (n, 2) wind counter-clockwise about points (..., 1, 2) off them."""
+    left = turn(at, start, end)
+    up = (start[:, 1] <= at[..., 1]) & (end[:, 1] > at[..., 1]) & (left > 0)
+    down = (start[:, 1] > at[..., 1]) & (end[:, 1] <= at[..., 1]) & (left < 0)
+    return np.asarray(up.sum(axis=-1) - down.sum(axis=-1))
 
 
 def in_words(points: Sequence[float] | np.ndarray) -> str:
@@ -217,14 +218,11 @@ class OutlineSide:
     @cached_property
     def extremes(self) -> list[Point]:
         """Ends and points farthest along the axes: the box around these is that around the side [m]."""
-        found = [self.start, self.end]
-        if self.arc is not None:
-            _, _, begin, turn = self.arc
-            for quarter in range(-8, 9):
-                parameter = (quarter * math.pi / 2 - begin) / turn
-                if 0 < parameter < 1:
-                    found.append(self.at(parameter))
-        return found
+        if self.arc is None:
+            return [self.start, self.end]
+        _, _, begin, turn = self.arc
+        parameters = ((quarter * math.pi / 2 - begin) / turn for quarter in range(-8, 9))
+        return [self.start, self.end, *(self.at(one) for one in parameters if 0 < one < 1)]
 
     def nearest(self, point: Point) -> tuple[float, float]:
         """Parameter at which it is nearest to a point, and the distance there [m]."""
@@ -234,11 +232,8 @@ class OutlineSide:
             share = min(max(share, 0.0), 1.0)
             return share, math.dist(self.at(share), point)
         # The best of some stretches, then halving of the angle between the way to the point and the tangent.
-        count = 32
-        tries = [i / count for i in range(count + 1)]
-        distances = [math.dist(self.at(one), point) for one in tries]
-        best = min(range(count + 1), key=distances.__getitem__)
-        low, high = tries[max(best - 1, 0)], tries[min(best + 1, count)]
+        best = min(range(33), key=lambda i: math.dist(self.at(i / 32), point)) / 32
+        low, high = max(best - 1 / 32, 0.0), min(best + 1 / 32, 1.0)
         for _ in range(60):
             middle = 0.5 * (low + high)
             (x, y), (u, v) = self.at(middle), self.slope(middle)
@@ -251,9 +246,6 @@ class OutlineSide:
 
     def parameter_near(self, point: Point, distance: float) -> float | None:
         """Parameter at which it is nearest to a point, where that is within a distance [m]; None otherwise."""
-        low, high = extent([self])
-        if any(not low[i] - distance <= point[i] <= high[i] + distance for i in range(2)):
-            return None
         parameter, found = self.nearest(point)
         return parameter if found <= distance else None
 
@@ -313,7 +305,7 @@ def _closing_edges(count: int, first: int = 0) -> np.ndarray:
 def winds_about(sides: tuple[OutlineSide, ...], point: Point) -> bool:
     """Return whether a round winds about a point that is not on it."""
     points, _ = polygon(sides)
-    return winding(points, _closing_edges(len(points)), np.array(point)) != 0
+    return bool(winding(points, np.roll(points, -1, axis=0), np.array(point)))
 
 
 def find_meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:

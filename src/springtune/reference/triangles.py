@@ -17,7 +17,7 @@ from numpy.polynomial.legendre import Legendre, legder, leggauss, legval
 from scipy import spatial
 
 from ..mesh.cells import MeshError, signed_areas
-from ..mesh.free import triangulate, upright
+from ..mesh.free import triangulate
 from ..mesh.sheets import GroupedMesh, part_names
 from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
@@ -322,7 +322,7 @@ def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], exten
     remedy = "look for sides that meet or touch"
     made = triangulate((given - origin) * scale, lines, repr(name), remedy, maxh=1.0, grading=0.5)
     points = made.points / scale + origin
-    triangles, parts = upright(points, made.triangles), made.regions - 1
+    triangles, parts = made.triangles, made.regions - 1
 
     sides = {}
     exact = points.copy()
