@@ -180,7 +180,7 @@ def measure(scenes: int, folder: Path) -> dict[str, Numbers]:
     found["collect"] = python("-m", "springtune.studies.kinds.collect", *words)
     found["dataset"] = {"MB": megabytes(dataset)}
     page, done = results / "index.html", str(results / "done/browse.json")
-    found["page"] = python("-m", "springtune.studies.output.browse.page", str(dataset), str(page), done, "")
+    found["page"] = python("-m", "springtune.studies.output.browse", str(dataset), str(page), done, "")
     done = str(results / "done/present.json")
     found["tables"] = python("-m", "springtune.studies.output.present", str(dataset), str(results), done, "", "tables")
     done = str(results / "done/figures.json")

@@ -13,7 +13,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 import springtune as st
 from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
-from springtune.studies.output.browse.page import page
+from springtune.studies.output.browse import page
 from springtune.studies.output.dataset import STATUS
 
 from synthetic import LABELS, dataset

@@ -27,7 +27,7 @@ WITHIN = re.compile(
     r"|springtune/(cli/study_of_a_(beam|shape)|studies/kinds/\w+/views)\.yaml"
     r"|springtune/handover/templates/[\w.]+\.jinja"
     r"|springtune/studies/(kinds/\w+/\w+\.csv|output/style\.mplstyle)"
-    r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
+    r"|springtune/studies/output/assets/\w+\.(css|html|js)"
     r"|springtune/workflow/(Snakefile|README.md|config/.*|docs/.*|examples/.*|profiles/.*|workflow/.*)"
     r"|snakemake_logger_plugin_springtune/\w+\.py"
     rf"|{NAME}\.dist-info/(METADATA|WHEEL|RECORD|entry_points\.txt|licenses/LICENSE)"

@@ -25,7 +25,7 @@ from springtune.cli import main
 from springtune.mesh.formats import read_beam_mesh, read_shape, write_mesh
 from springtune.mesh.rows import braced, lattice, right
 from springtune.safe_io.files import ABANDONED_SECONDS, remove_unfinished, replacing, write_text
-from springtune.studies.output.browse.page import page
+from springtune.studies.output.browse import page
 from springtune.studies.output.dataset import write
 
 from synthetic import dataset

@@ -9,7 +9,7 @@ import xarray as xr
 
 import springtune as st
 from springtune.studies.kinds import collect
-from springtune.studies.output import page
+from springtune.studies.output import present
 from springtune.studies.runs import store
 
 from campaigns import Campaign
@@ -104,7 +104,7 @@ def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
         assert root.reference_message.item() == f"no reference: {lost}"
         assert (root.reference_applies == 0).all() and (root.status == 1).all()
         assert (root.message == f"no reference: {lost}").all()
-        written = page.write(tree, tmp_path)
+        written = present.write_page(tree, tmp_path)
     assert f"no reference: {lost}" in (tmp_path / "index.html").read_text()
     rows = csv.DictReader((tmp_path / written[0]).read_text().splitlines())
     applies = {(row["beam"], row["kinematics"]): row["reference_applies"] for row in rows}

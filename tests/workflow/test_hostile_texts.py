@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 import pytest
 
 import springtune as st
-from springtune.studies.output.browse.page import page
+from springtune.studies.output.browse import page
 
 from tables import STUDIES, beside
 

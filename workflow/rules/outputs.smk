@@ -47,5 +47,5 @@ rule browse:
     benchmark:
         RESULTS / "benchmarks/browse.tsv"
     shell:
-        "python -m springtune.studies.output.browse.page {input.dataset:q} {output.page:q} {output.done:q}"
+        "python -m springtune.studies.output.browse {input.dataset:q} {output.page:q} {output.done:q}"
         " {params.digest:q} {params.files:q} > {log:q} 2>&1"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from springtune.studies.kinds import collect
-from springtune.studies.output.selection import select_own_law
+from springtune.studies.output.dataset import select_own_law
 from springtune.studies.runs import provenance
 
 import campaigns

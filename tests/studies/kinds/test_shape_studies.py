@@ -15,7 +15,7 @@ from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.kind import shape_mesh_keys, shape_reference_task, shape_scene_task
 from springtune.studies.kinds.bodies.shapes import LARGEST_FILE_CHECKED
-from springtune.studies.output import page
+from springtune.studies.output import present
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.runs.rerun import output_files
 
@@ -111,7 +111,7 @@ def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
     study, tree, told = cook
     assert not tree.data_vars and set(tree.children) == {"shapes", "shape_fields"}
     assert "4 solved" in told and study.title in told
-    made = {name for name in page.write(tree, tmp_path) if name != "index.html"}
+    made = {name for name in present.write_page(tree, tmp_path) if name != "index.html"}
     assert made | {"index.html"} == {Path(name).name for name in output_files(outputs()["tables"], study)}
     rows = (tmp_path / "shapes.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * len(study.shapes.scenes)

@@ -15,7 +15,7 @@ from springtune.studies.kinds.moduli import outputs as definitions
 from springtune.studies.kinds.moduli.kind import KIND as MODULI
 from springtune.studies.kinds.stability import outputs as stability
 from springtune.studies.kinds.stability.kind import KIND as STABILITY
-from springtune.studies.output import page as tables_page
+from springtune.studies.output.present import write_page
 from springtune.studies.output.text import decimals, number
 
 from synthetic import filled
@@ -139,7 +139,7 @@ def lines_of(folder):
 
 
 def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
-    assert tables_page.write(scenes(), tmp_path)[-1] == "index.html"
+    assert write_page(scenes(), tmp_path)[-1] == "index.html"
     html, lines = lines_of(tmp_path)
     found = [line for line in lines if "nonlinear" in line or "linear" in line]
     compression, traction = found[:2], found[2:]
@@ -154,10 +154,10 @@ def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
 
 
 def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_path):
-    tables_page.write(scenes(), tmp_path)
+    write_page(scenes(), tmp_path)
     html, _ = lines_of(tmp_path)
     assert "paper prints" not in html and "printed" not in html.split("</style>")[1] and "Table" not in html
-    tables_page.write(scenes(printed=True), tmp_path)
+    write_page(scenes(printed=True), tmp_path)
     html, lines = lines_of(tmp_path)
     assert "Paper, as printed" in html and "Table 7: traction" in html
     assert ["3.400", "3.60", "5.88"] in [line[3:6] for line in lines]

@@ -13,7 +13,7 @@ import springtune as st
 from counting import counted
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies import kind as bodies
-from springtune.studies.output import page
+from springtune.studies.output import present
 from springtune.studies.runs import rerun, store
 
 REPOSITORY = Path(__file__).parents[3]
@@ -89,8 +89,8 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
 
 
 def test_the_page_of_tables_shows_so_many_rows_and_says_so():
-    rows = [{"name": f"row {number}", "error_percent": 0.5} for number in range(page.MOST_ROWS + 1)]
+    rows = [{"name": f"row {number}", "error_percent": 0.5} for number in range(present.MOST_ROWS + 1)]
     tree = xr.DataTree(xr.Dataset(attrs={"study": "many"}))
-    many, few = (page.html([{"stem": "many", "title": "Many", "rows": found}], tree) for found in (rows, rows[:-1]))
-    assert many.count("<tr") == few.count("<tr") == page.MOST_ROWS + 1
+    many, few = (present.html([{"stem": "many", "title": "Many", "rows": found}], tree) for found in (rows, rows[:-1]))
+    assert many.count("<tr") == few.count("<tr") == present.MOST_ROWS + 1
     assert "The first 1000 of 1001 rows; the file has all of them: " in many and "The first" not in few

@@ -13,10 +13,9 @@ from springtune.problem.quantities import MOST_SCENES, MOST_SCENES_VARIABLE, nea
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from .combinations import SAME_VALUE, factors
 from .messages import Key, Problems, part_of, show
 from .model import Grid
-from .sections import StatedStiffness, StudyConfig
+from .sections import SAME_VALUE, StatedStiffness, StudyConfig, factors
 
 PLAUSIBLE_FACTOR = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness is an error of units, as the paper's 170E6 N/mm."""

@@ -1,6 +1,8 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
+from collections.abc import Iterator
 from functools import cache
+from itertools import chain, product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -338,6 +340,39 @@ class GridConfig(Section):
 
 GRID_PARAMETERS = tuple(name for name in GridConfig.model_fields if name not in ("rows", "sensitivity"))
 """Keys of a grid whose values are combined."""
+
+
+Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
+"""Names of zipped parameters, and one tuple of values for each combination."""
+
+Combination = dict[str, Any]
+
+SAME_VALUE = 1e-9
+"""Relative difference below which two numbers are the same value."""
+
+
+def factors(grid: GridConfig) -> list[Factor]:
+    """Factors whose product is all combinations of a grid; forces by beam, material or load go with it."""
+    columns = tuple(grid.rows[1:])
+    names = [name for name in GRID_PARAMETERS if getattr(grid, name) and name not in columns]
+    found: list[Factor] = []
+    for group in filter(None, (columns, *((name,) for name in names))):
+        if group != ("force",) or not isinstance(grid.force, dict):
+            found.append((group, list(zip(*(getattr(grid, name) for name in group), strict=True))))
+    if isinstance(grid.force, dict):
+        place = next(number for number, (group, _) in enumerate(found) if grid.force_owner in group)
+        group, rows = found[place]
+        owner = group.index(grid.force_owner)
+        found[place] = (*group, "force"), [(*row, force) for row in rows for force in grid.force.get(row[owner], ())]
+    return found
+
+
+def combinations(grid: GridConfig) -> Iterator[Combination]:
+    """Yield the combinations of a grid."""
+    parts = factors(grid)
+    names = [*chain.from_iterable(group for group, _ in parts)]
+    for rows in product(*(rows for _, rows in parts)):
+        yield dict(zip(names, chain.from_iterable(rows)))
 
 
 def _check_mesh_type_names(files: dict[str, Any]) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from matplotlib.image import AxesImage
 from springtune.problem.compare import sign_sentence
 from springtune.problem.quantities import Status
 
-from . import labels, style
-from .error_scale import ERROR_COLOURS, ERROR_RANGE
+from . import style
+from .answers import ERROR_COLOURS, ERROR_RANGE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,7 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     """Draw the deformation error over uniform stiffness, and its zero."""
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.5))
     error, said = 100 * curve.error, []
-    unit, written = labels.power_of_ten(float(curve.stiffness.max()))
+    unit, written = style.power_of_ten(float(curve.stiffness.max()))
     panel.axhline(0.0, color="0.6", linewidth=0.7)
     colour, stiffness = style.line(0)["color"], curve.stiffness / unit
     panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
@@ -75,8 +75,8 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
         )
         said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
     else:
-        labels.write_reason(panel, curve.message or "There is no reference, and so no error.", bare=False)
-    labels.add_legend(panel, said)
+        style.write_reason(panel, curve.message or "There is no reference, and so no error.", bare=False)
+    style.add_legend(panel, said)
     return panel
 
 

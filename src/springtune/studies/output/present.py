@@ -1,17 +1,21 @@
-"""Make a study's outputs: figures in PNG and PDF files, and tables."""
+"""Make a study's outputs: figures in PNG and PDF files, and tables, each as CSV and all on one page."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import pandas as pd
 import xarray as xr
 
 from springtune.registry import import_name
-from springtune.safe_io.files import write_bytes, write_json
+from springtune.safe_io.files import write_bytes, write_json, write_text
 
-from ..config.kind import outputs
+from ..config.kind import modules, outputs
 from . import reading
+from .dataset import sign_of_errors
+from .text import csv_text, decimals, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,9 +34,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
                 made += _draw(output, tree, figures)
             into = Path(folder) / output.into
             if output.page:
-                from . import page  # here: few jobs write the page
-
-                made += [into / name for name in page.write(tree, into)]
+                made += [into / name for name in write_page(tree, into)]
             if output.write:
                 made += [into / name for name in import_name(output.write)(tree, into)]
     return made
@@ -56,7 +58,6 @@ def _choose_style(tree: xr.DataTree) -> None:
 def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     # Here: a job that only writes tables needs no matplotlib.
     import matplotlib.pyplot as plt
-    import numpy as np
 
     from . import style
 
@@ -78,6 +79,100 @@ def _single(tree: xr.DataTree, output: "Output") -> "Axes":
     _, ((panel,),) = style.panels(None, figsize=(style.COLUMN_WIDTH, 2.4))
     output.draw(panel, tree[output.name].to_dataset())
     return panel
+
+
+# -- the page of all tables --------------------------------------------------------------------------------------------
+
+MOST_ROWS = 1000
+"""Most rows on the page; CSV files have all."""
+
+COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa", "ms": "ms"}
+
+
+def write_page(tree: xr.DataTree, folder: str | Path) -> list[str]:
+    """Write a CSV file for each table, and a page with all."""
+    found = (getattr(import_name(name), "tables", None) for name in modules("outputs", "tables"))
+    tables = [table for of_kind in found if of_kind for table in of_kind(tree)]
+    written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
+    written["index.html"] = html(tables, tree)
+    for name, text in written.items():
+        write_text(Path(folder) / name, text)
+    return list(written)
+
+
+def html(tables: Iterable[Mapping[str, Any]], tree: xr.DataTree) -> str:
+    """Page of tables: each has a stem, a title, rows, and may have a note, remarks, marks and the cells `shown`."""
+    import jinja2  # here: few jobs write the page
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("springtune.studies.output", ""),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    root, scenes = tree.to_dataset(), any("marks" in table for table in tables)
+    shown = [
+        dict(table) | {"html": _html_table(table), "beyond": _note_on_left_out_rows(table["rows"])} for table in tables
+    ]
+    return environment.get_template("page.html").render(
+        tables=shown,
+        scenes=scenes,
+        sign=sign_of_errors(root) if scenes else "",
+        beams=_beam_sizes(root),
+        marks={mark for table in tables for mark in table.get("marks", "")},
+        attributes=tree.attrs,
+    )
+
+
+def _html_table(table: Mapping[str, Any]) -> str:
+    """Table without its rows beyond `MOST_ROWS`."""
+    cells = table["shown"] if "shown" in table else texts(table["rows"])
+    return str(cells.to_html(index=False, border=0)) if len(cells) else ""
+
+
+def _note_on_left_out_rows(rows: list[Mapping[str, Any]]) -> str:
+    """Note on rows that are left out."""
+    return f"The first {MOST_ROWS} of {len(rows)} rows; the file has all of them: " if len(rows) > MOST_ROWS else ""
+
+
+def _beam_sizes(root: xr.Dataset) -> list[str]:
+    """Extents of a study's beams; their thickness where it is not swept."""
+    names = [name for name in ("beam_length", "beam_height", "beam_thickness") if name in root]
+    if not names:
+        return []
+    frame = root[[name for name in names if root[name].dims == ("beam",)]].to_dataframe()
+    sizes = (1e3 * frame.filter(like="beam_")).dropna()
+    return [f"{beam}, {' x '.join(f'{size:.4g}' for size in row)} mm" for beam, row in zip(sizes.index, sizes.values)]
+
+
+def texts(rows: list[Mapping[str, Any]]) -> pd.DataFrame:
+    """Cells of a table as texts, a number with the digits that its column needs."""
+    data = pd.DataFrame(rows)
+    return pd.DataFrame({head(name): _column_texts(name, data[name].tolist()) for name in data}).head(MOST_ROWS)
+
+
+def _column_texts(name: str, values: list[Any]) -> list[str]:
+    if any(isinstance(value, str) for value in values):
+        return [value if isinstance(value, str) else "–" for value in values]
+    short = [f"{value:g}" for value in values]
+    if max(map(len, short)) <= 4 and "nan" not in short:  # as a study says it: mesh sizes, friction
+        return short
+    error = "error" in name
+    places = error_decimals(values) if error else decimals(values)
+    return [number(value, places, sign=error) for value in values]
+
+
+def error_decimals(values: Iterable[float]) -> int:
+    """Decimals of errors [%] for three digits of their median."""
+    sizes = np.abs([value for value in values if np.isfinite(value) and value])
+    return int(np.clip(decimals([float(np.median(sizes))], 3) or 0, 1, 4)) if len(sizes) else 2
+
+
+def head(name: str) -> str:
+    """Column name with its unit in brackets."""
+    words = name.split("_")
+    unit = COLUMN_UNITS.get(words[-1], "") if len(words) > 1 else ""
+    return f"{' '.join(words[:-1])} [{unit}]" if unit else " ".join(words)
 
 
 if __name__ == "__main__":

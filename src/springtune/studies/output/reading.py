@@ -187,7 +187,7 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
 
     from springtune.problem.quantities import SWEPT
 
-    from .selection import SHOWN_PREFIX, choose, group
+    from .dataset import SHOWN_PREFIX, choose, group
 
     fields = group(data, "fields")
     # Of what is swept, fields are of one value each; the values of the scenes are no coordinates of theirs.

@@ -78,15 +78,15 @@ def _present_digest(members: Iterable[Output], files: list[str]) -> str:
     for one in members:
         used += filter(None, (name.partition(":")[0] for name in (one.module, one.write)))
         if one.page:
-            used += ["studies.output.page", *modules("tables")]
+            used += modules("tables")
             templates.append(checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 
 
 def _browse_digest(study: Study) -> str:
-    files = [*sorted((PACKAGE / "studies/output/browse/assets").iterdir()), *kind_files(VIEWS)]
+    files = [*sorted((PACKAGE / "studies/output/assets").iterdir()), *kind_files(VIEWS)]
     assets = [(path.name, checksum(path)) for path in files]
-    return hash_of(linked_files(study), stage_key("studies.output.browse.page"), assets)
+    return hash_of(linked_files(study), stage_key("studies.output.browse"), assets)
 
 
 def paper_job(source: Path, datasets: Iterable[Path], folder: Path) -> Job:

@@ -5,8 +5,8 @@ import numpy as np
 from springtune.problem.compare import unbeaten
 from springtune.problem.quantities import Status
 
-from ...output import labels, style
-from ...output.selection import choose, group
+from ...output import style
+from ...output.dataset import choose, group
 
 FIRST_NAMED = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles",
                "quadratic-triangles", "boundary-elements", "tensor-mass", "calculix-cps3",
@@ -81,14 +81,14 @@ def plot_benchmark(data, ax=None, *, scene=None):
     panel.set(xlabel="Run time from mesh to displacement [s]", ylabel="|Error| [%]", title=case.scene.item())
     if not shown:
         why = _missing_cases(case) or "none was requested"
-        labels.write_reason(panel, f"No approach has an error and a time: {why}.")
+        style.write_reason(panel, f"No approach has an error and a time: {why}.")
         return panel
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
         panel.plot([seconds], [estimate], "*", color="black", markersize=7, label="the reference")
     panel.set(**style.LOGARITHMIC)
     style.plain(panel, "x", "y")
-    labels.add_legend(panel, [lost])
+    style.add_legend(panel, [lost])
     return panel
 
 
@@ -100,5 +100,5 @@ def _scene(data, scene):
 
 def _missing_cases(case):
     """Count the cases without numbers by status, in words; empty if all have them."""
-    counts = labels.count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
+    counts = style.count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)

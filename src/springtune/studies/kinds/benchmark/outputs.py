@@ -27,8 +27,10 @@ STEP_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "million_springs_a_second": 
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.dataset import STATUS  # here, since a plan does without xarray
-    from ...output.selection import table_rows
+    from ...output.dataset import (
+        STATUS,  # here, since a plan does without xarray
+        table_rows,
+    )
 
     if "benchmark" not in tree:
         return []

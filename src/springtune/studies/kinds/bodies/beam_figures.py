@@ -8,9 +8,8 @@ from springtune.problem.quantities import SWEPT, with_unit
 from springtune.springs.lattice import COEFFICIENT
 
 from ...config.kind import distinct
-from ...output import labels, style
-from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, plane_vectors, status_words
-from ...output.selection import (
+from ...output import style
+from ...output.dataset import (
     at,
     cells,
     choose,
@@ -22,6 +21,7 @@ from ...output.selection import (
     shown_swept,
     sign_of_errors,
 )
+from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, plane_vectors, status_words
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .tables import like_with_like
 
@@ -89,7 +89,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     # The force has a place of its own.
     words = swept_words({name: value for name, value in values.items() if name != "force" or root is None})
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.6))
-    unit, written = labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
+    unit, written = style.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
     known, seen = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit, set()
     for number, size in enumerate(labels_of(curves.status != 0, "mesh_size")):
         curve = curves.sel(mesh_size=size)
@@ -109,7 +109,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
         if panel.get_xlim()[0] < value < panel.get_xlim()[1]:
             mark_stiffness(panel, value, f"the paper's {value:g}")
     key = [Line2D([], [], color="0.3", label=text, **look) for name, (text, look) in LEGEND.items() if name in seen]
-    labels.add_legend(panel, why=_reason_without_curve(curves), key=key)
+    style.add_legend(panel, why=_reason_without_curve(curves), key=key)
     return panel
 
 
@@ -159,7 +159,7 @@ def _sensitivity_title(panel, root, selection, swept):
     if root is not None and "beam" in shown:
         shown["beam"] = labelled_beam(root, shown["beam"])
     words = [*title_labels(shown, "beam", "mesh_type", "material", "load"), *swept]
-    first = labels.wrap_to_panel(panel, [", ".join(words)], 8)
+    first = style.wrap_to_panel(panel, [", ".join(words)], 8)
     if root is None:
         return first
     force, reference = float(root.force), float(root.reference_displacement)
@@ -268,7 +268,7 @@ def plot_deformed(
     height = max(float(np.clip((style.PAGE_WIDTH - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
     title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
-    return labels.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
+    return style.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
 
 
 def _draw_deformed(panel, part):
@@ -283,7 +283,7 @@ def _draw_deformed(panel, part):
     scale, flag = magnification(here), int(root.status.sel(mesh_size=here.mesh_size.values))
     draw_network(panel, here, scale)
     text = f"{panel.get_title('left')}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
-    panel.set_title(labels.wrap_to_panel(panel, [text], 8))
+    panel.set_title(style.wrap_to_panel(panel, [text], 8))
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
     beyond = [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
@@ -330,7 +330,7 @@ def _draw_panels(ax, shown, draw, title, sign):
         said = draw(panel, *part)
         return said, f"no errors: {'; '.join(said)}"
 
-    return labels.small_multiples(ax, shown, 2 if len(shown) == 4 else 3, 2.1, title, drawn, sharey=True, said=sign)
+    return style.small_multiples(ax, shown, 2 if len(shown) == 4 else 3, 2.1, title, drawn, sharey=True, said=sign)
 
 
 def _draw_lines(panel, places, here, looks, listed, gaps):
@@ -411,7 +411,7 @@ def _draw_over_sizes(panel, here, looks):
     """Draw errors of a beam over mesh size; return notes."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes = 1e3 * here.mesh_size.values
-    places = labels.sizes_axis(panel, sizes, len(looks))
+    places = style.sizes_axis(panel, sizes, len(looks))
 
     def listed(numbers):
         return f"{', '.join(f'{sizes[number]:g}' for number in numbers)} mm"
@@ -629,13 +629,13 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     values = last_swept(here.status != 0)
     words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
     words += swept_words({name: value.sel(load=load) for name, value in values.items()})
-    labels.add_title(figure, ", ".join(words))
+    style.add_title(figure, ", ".join(words))
     left, right = axes[0]
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
     here, faces = at(here, values), at(faces.sel(chosen), values)
     curves = None if curves is None else at(curves, values)
-    labels.add_legend(left, *_draw_errors_over_stiffness(left, curves, here))
-    labels.add_legend(right, *_draw_pressed_face(right, faces, here, load))
+    style.add_legend(left, *_draw_errors_over_stiffness(left, curves, here))
+    style.add_legend(right, *_draw_pressed_face(right, faces, here, load))
     return axes[0]
 
 

@@ -19,8 +19,7 @@ from springtune.springs.lattice import predicted_stiffness
 
 from ...config.kind import declared_variables
 from ...config.model import Reference, keeps_fields
-from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SPRING_ATTRIBUTES, UGRID, Group
-from ...output.selection import SHOWN_PREFIX
+from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING_ATTRIBUTES, UGRID, Group
 from ...runs import store
 from . import any_reference, stored
 from . import kind as bodies

@@ -5,9 +5,8 @@ from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io.texts import no_mathematics
 
-from ...output import drawing, labels, style
-from ...output.dataset import STATUS
-from ...output.selection import cells, choose, group, labels_of
+from ...output import drawing, style
+from ...output.dataset import STATUS, cells, choose, group, labels_of
 from .outputs import DEFORMED_STEM, ERRORS_STEM, shape_figures
 
 NETWORKS_IN_ROW = 3
@@ -78,11 +77,11 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
     figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE_WIDTH, 0.35 + tall * rows))
-    labels.add_title(figure, title)
+    style.add_title(figure, title)
     for panels, name in zip(axes, names):
         _draw_errors(panels, cut, name, points[name])
     for panel in axes.flat if not names else ():
-        labels.write_reason(panel, "No quantity was asked for.")
+        style.write_reason(panel, "No quantity was asked for.")
     return axes
 
 
@@ -144,7 +143,7 @@ def _draw_errors(panels, cut, name, points):
     for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
         panel.set(xlabel=words, ylabel=f"|{against}| [%]")
         if not there:
-            labels.write_reason(panel, _reason_without_error(cut))
+            style.write_reason(panel, _reason_without_error(cut))
             continue
         panel.set(xscale="log", yscale="log")
         low = panel.get_ylim()[0]
@@ -153,7 +152,7 @@ def _draw_errors(panels, cut, name, points):
             panel.set_ylim(low, None)
         style.plain(panel, "x", "y")
     panels[1].set_ylabel("")
-    labels.add_legend(panels[1])
+    style.add_legend(panels[1])
     panels[0].set_title(f"{name}: {described(cut, name)}")
     said = [f"{difference:.2g} % from expected"] if difference > 0 else []
     said += [f"known to {estimate:.1g} %"] if estimate > 0 else []
@@ -209,7 +208,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
     if not np.isfinite(errors).any():
-        labels.write_reason(panel, "No quantity has an error: see status and message.")
+        style.write_reason(panel, "No quantity has an error: see status and message.")
         return panel
     drawing.heat_map(panel, errors, np.array(texts, dtype=object))
     panel.set_yticks(range(len(rows)), list(map(no_mathematics, rows)))
@@ -310,7 +309,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     def draw(panel, part):
         return _draw_network(panel, *part, scale, most), ""
 
-    flat = labels.small_multiples(ax, shown, NETWORKS_IN_ROW, tall, ", ".join(said), draw, said=below)
+    flat = style.small_multiples(ax, shown, NETWORKS_IN_ROW, tall, ", ".join(said), draw, said=below)
     lines = [one for panel in flat for one in panel.collections]
     if lines and flat[0].figure.get_layout_engine():
         bar = flat[0].figure.colorbar(lines[0], ax=flat.tolist(), location="bottom", extend="both", aspect=50,

@@ -7,9 +7,8 @@ from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT
 
-from ...output.dataset import STATUS
-from ...output.page import MOST_ROWS, error_decimals, head
-from ...output.selection import cells, group, labels_of, own_law_references, records, select_own_law, table_rows
+from ...output.dataset import STATUS, cells, group, labels_of, own_law_references, records, select_own_law, table_rows
+from ...output.present import MOST_ROWS, error_decimals, head
 from ...output.text import decimals, number, range_text
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
 

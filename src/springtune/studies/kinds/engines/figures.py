@@ -4,8 +4,8 @@ import numpy as np
 
 from springtune.problem.compare import unbeaten
 
-from ...output import labels, style
-from ...output.selection import choose, group, labels_of
+from ...output import style
+from ...output.dataset import choose, group, labels_of
 from ...output.text import cell_text
 from . import RUN_ENDS, SETTING
 
@@ -93,7 +93,7 @@ def plot_engine_errors(data, ax=None, *, scene=None):
             panel.axvline(1e3 * FRAME_SECONDS, color="0.7", linewidth=0.9, zorder=0)
             said.insert(1, "right of the grey line: slower than real time")
         style.plain(panel, "x", "y")
-    labels.add_legend(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
+    style.add_legend(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
     return panel
 
 
@@ -146,4 +146,4 @@ def plot_engine_curves(data, ax=None, *, scene=None):
         return [], ""
 
     title = f"{case.scene.item()}, +: the network in equilibrium{'; not drawn: ' + lost if lost else ''}"
-    return labels.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)
+    return style.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)

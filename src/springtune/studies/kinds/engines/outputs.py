@@ -33,7 +33,7 @@ ENGINE_COLUMNS = {
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.selection import table_rows  # here, since a plan does without xarray
+    from ...output.dataset import table_rows  # here, since a plan does without xarray
     from . import RUN_ENDS
 
     if "engines" not in tree:

@@ -4,8 +4,8 @@ import numpy as np
 
 from springtune.safe_io.texts import no_mathematics
 
-from ...output import labels, style
-from ...output.selection import cells, choose, group, labels_of
+from ...output import style
+from ...output.dataset import cells, choose, group, labels_of
 
 
 def laying(tree):
@@ -66,7 +66,7 @@ def _draw_row(row, laid, cell, names):
     first = _draw_shape(shape, laid, names)
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
     shape.set(aspect="equal", adjustable="datalim")
-    labels.add_note(shape, [first])
+    style.add_note(shape, [first])
     known, reference = 100 * float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
     if np.isfinite(reference):
         found = ", error unknown"
@@ -74,7 +74,7 @@ def _draw_row(row, laid, cell, names):
             elongation.axvspan(reference - known, reference + known, color="0.87", zorder=0)
             found = f" ± {known:.2g}"
         elongation.axvline(reference, color="0.45", linewidth=1.5)
-        labels.add_note(elongation, [f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")])
+        style.add_note(elongation, [f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")])
     area.axvline(0, color="0.45", linewidth=1.5)
     for panel, name in ((area, "area_error"), (elongation, "elongation")):
         _draw_dots(panel, laid, names, name)
@@ -82,7 +82,7 @@ def _draw_row(row, laid, cell, names):
     elongation.set(xlabel="Elongation [%]", title="Lower fibre")
     elongation.tick_params(labelleft=False)
     if ((laid.status == 1).sum("mesh_size") > 1).any():
-        labels.add_note(area, ["filled: finest mesh; hollow: coarser"])
+        style.add_note(area, ["filled: finest mesh; hollow: coarser"])
 
 
 def _outline_points(laid, name):
@@ -119,7 +119,7 @@ def _draw_dots(panel, laid, names, variable):
         panel.plot(values[solved[1:]], np.full(len(solved[1:]), number), markerfacecolor="white", **mark)
         panel.plot(values[solved[:1]], np.full(len(solved[:1]), number), markersize=4.5, label=definition, **mark)
         if not len(solved):
-            said = ", ".join(labels.count_statuses(strips.status.values)) or "not requested"
+            said = ", ".join(style.count_statuses(strips.status.values)) or "not requested"
             panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
                        fontsize=style.SMALL_TEXT, color="0.25")  # fmt: skip
     panel.set_yticks(range(len(names)), map(no_mathematics, names))

@@ -29,7 +29,7 @@ LAYING_COLUMNS = {
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.selection import table_rows  # here, since a plan does without xarray
+    from ...output.dataset import table_rows  # here, since a plan does without xarray
 
     if "laying" not in tree:
         return []

@@ -4,10 +4,9 @@ import numpy as np
 
 from springtune.safe_io.texts import no_mathematics
 
-from ...output import labels, style
-from ...output.dataset import most_requested
+from ...output import style
+from ...output.dataset import choose, group, labelled_beam, labels_of, most_requested, sign_of_errors, unswept
 from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
-from ...output.selection import choose, group, labelled_beam, labels_of, sign_of_errors, unswept
 
 
 def definitions(tree):
@@ -53,7 +52,7 @@ def plot_moduli(data, ax=None):
     moduli = group(data, "moduli")
     title = "Effective over requested Poisson's ratio; grey: equal"
     shown = {name: moduli.sel(mesh_type=name) for name in labels_of(moduli.status != 0, "mesh_type")}
-    return labels.small_multiples(ax, shown, 2, 1.95, title, _moduli)
+    return style.small_multiples(ax, shown, 2, 1.95, title, _moduli)
 
 
 def _moduli(panel, here):
@@ -73,10 +72,10 @@ def _moduli(panel, here):
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
-    for number, names in enumerate(labels.group_equal_curves(curves, 0.012)):
+    for number, names in enumerate(style.group_equal_curves(curves, 0.012)):
         panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
     said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
-    counts = ", ".join(f"{name} ({count})" for name, count in labels.count_statuses(here.status.values).items())
+    counts = ", ".join(f"{name} ({count})" for name, count in style.count_statuses(here.status.values).items())
     return said, f"No definition has moduli here: {counts or 'none was requested'}."
 
 
@@ -152,7 +151,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}: deformation error [%] on the finest mesh solved"
     )
     said, height = "; ".join(filter(None, said)), 1.2 + 0.165 * len(names)
-    return labels.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
+    return style.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
 
 
 def _default_materials(root, solved):

@@ -36,8 +36,7 @@ def tables(tree):
     """Make the table of error ranges by definition, mesh type, material, load and mesh size."""
     import pandas as pd  # here, since a plan does without it and xarray
 
-    from ...output.dataset import most_requested
-    from ...output.selection import unswept
+    from ...output.dataset import most_requested, unswept
 
     if "moduli" not in tree or "deformation_error" not in tree:
         return []

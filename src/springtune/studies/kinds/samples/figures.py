@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ...output import labels, style
-from ...output.selection import choose, group, labels_of
+from ...output import style
+from ...output.dataset import choose, group, labels_of
 
 PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": "Young's modulus"}
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
@@ -75,7 +75,7 @@ def plot_sobol(data, ax=None, *, load=None):
         panel.grid(False, axis="y")
         if not np.isfinite(indices.first_order.values).any():
             none = "no base sample of which all scenes have a value"
-            labels.write_reason(panel, "does not vary" if int(indices.base_samples) else none, bare=False)
+            style.write_reason(panel, "does not vary" if int(indices.base_samples) else none, bare=False)
         return [], ""
 
     note = "full: first order, pale: total order; lines: bootstrap bands, 95 %" + ", cut off" * bool(
@@ -86,7 +86,7 @@ def plot_sobol(data, ax=None, *, load=None):
     columns = max(1, min(4, len(order)))
     title = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
     title, height = f"{title}: Sobol indices", 0.21 * len(names) + 0.8
-    return labels.small_multiples(ax, shown, columns, height, title, draw, sharey=True, said=note)
+    return style.small_multiples(ax, shown, columns, height, title, draw, sharey=True, said=note)
 
 
 def sobol(tree):

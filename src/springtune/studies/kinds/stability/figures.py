@@ -5,9 +5,8 @@ from matplotlib.colors import ListedColormap
 
 from springtune.safe_io.texts import no_mathematics
 
-from ...output import labels, style
-from ...output.dataset import STATUS
-from ...output.selection import group, labels_of
+from ...output import style
+from ...output.dataset import STATUS, group, labels_of
 
 BEHAVIOUR_COLOURS = {"stable": "#f4f4f4", "decaying": "#b5cfe3", "growing": "#d07a1f", "NaN": "#4a0d1a"}
 """Colours of the flags, from light to dark."""
@@ -86,8 +85,8 @@ def plot_stability_maps(data, ax=None):
     shown = {SCHEMES.get(name, name.replace("-", " ").capitalize().replace("euler", "Euler")): name
              for name in data.integrator.values}  # fmt: skip
     said = "Damping ratio of the highest mode, mass-proportional damping; line: predicted limit"
-    title, key = "Behaviour of noise by time step and damping", labels.swatches(BEHAVIOUR_COLOURS)
-    return labels.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, said=said, key=key)
+    title, key = "Behaviour of noise by time step and damping", style.swatches(BEHAVIOUR_COLOURS)
+    return style.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, said=said, key=key)
 
 
 @style.styled
@@ -143,8 +142,8 @@ def plot_stability_strains(data, ax=None):
         return [], "" if names else "No definition was solved under this load."
 
     seen = np.unique(data.strain_status.sel(definition=names)).astype(int)
-    key = labels.swatches({STATUS[flag].replace("_", " "): STATUS_COLOURS[flag] for flag in seen})
+    key = style.swatches({STATUS[flag].replace("_", " "): STATUS_COLOURS[flag] for flag in seen})
     said = "number: negative pivots; %: share of the load that is reached; f: flutter; path: unstable on the way"
     shown = {STRAIN_LOADS.get(load, load): load for load in data.strain_load.values}
     height = 0.6 + 0.19 * max(len(names), 2)
-    return labels.small_multiples(ax, shown, 1, height, "Equilibria at large strain", draw, said=said, key=key)
+    return style.small_multiples(ax, shown, 1, height, "Equilibria at large strain", draw, said=said, key=key)

@@ -57,7 +57,7 @@ STABILITY_TABLES = {
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
-    from ...output.selection import table_rows  # here, since a plan does without xarray
+    from ...output.dataset import table_rows  # here, since a plan does without xarray
 
     if "stability" not in tree:
         return []

@@ -1,0 +1,596 @@
+"""The page to browse a dataset with, in one file that needs neither a server nor a network.
+
+It has the dataset, the views of the study kinds, and BokehJS from its installed package.
+
+Numbers are packed as float32, rounded to the shown digits, as differences and by bytes; `assets/data.js` reads it.
+"""
+
+import base64
+import hashlib
+import json
+import os
+import re
+import sys
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import h5netcdf
+import jinja2
+import numpy as np
+import yaml
+from markupsafe import Markup
+
+from springtune.problem.compare import error_text
+from springtune.problem.quantities import Status
+from springtune.safe_io.files import write_json, write_text
+
+from ..config.kind import VIEWS, kind_files
+from . import reading
+from .answers import (
+    ERROR_COLOURS,
+    ERROR_RANGE,
+    Columns,
+    DefinitionErrors,
+    Variables,
+    broadcast,
+    definition_errors,
+    has_own_law,
+    requested_cells,
+    sign_of_displacements,
+    what_to_type,
+)
+from .text import label_text, range_text
+
+if TYPE_CHECKING:
+    from .dataset import Label
+
+PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
+"""Modules of the page's own script, in the order in which they are put together."""
+
+BOKEH_SCRIPTS = ("bokeh", "bokeh-api")
+"""Scripts of BokehJS that the page needs."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot of a group; readers choose along unnamed dimensions.
+
+    `by` has one line a label, or is a map's y axis. A line joins the points `along` a dimension if `x` is a variable.
+    `log` names logarithmic axes ("x", "y", "xy"), which show magnitudes.
+    """
+
+    title: str
+    value: str
+    x: str
+    by: str = ""
+    shows: Literal["lines", "points", "map"] = "lines"
+    along: str = ""
+    ascending: bool = False
+    log: Literal["", "x", "y", "xy"] = ""
+    equal: bool = False
+    beside: tuple[tuple[str, str, str], ...] = ()
+    selection: "Mapping[str, Label]" = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class View:
+    """View of a group: its `plots`, without missing variables, and table `columns` for the root."""
+
+    group: str
+    title: str
+    note: str = ""
+    plots: tuple[Plot, ...] = ()
+    columns: tuple[str, ...] = ()
+
+
+def views() -> dict[str, View]:
+    """Views that the study kinds declare, by group."""
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the first takes a sixth of the time, where it was built
+    texts = [path.read_text(encoding="utf-8") for path in kind_files(VIEWS)]
+    declared = [one for text in texts for one in yaml.load(text, loader)]
+    return {one["group"]: View(**one | {"plots": tuple(Plot(**plot) for plot in one["plots"])}) for one in declared}
+
+
+def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
+    """Page of a dataset."""
+    with reading.opened(dataset) as file, reading.guarded(dataset):
+        groups = packed(file)
+        parts = {group.name: _read(group, file) for group in (file, *file.groups.values()) if group.name in GROUPS}
+        found = overview(parts)
+    attributes = groups[0]["attributes"]
+    declared = {path: asdict(view) for path, view in views().items()}
+    scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
+    content = {"groups": groups, "declared": declared, "scale": scale}
+    library = _library()
+    texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
+    script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in PAGE_SCRIPTS) + "})();\n"
+    # Scripts run only with one of these hashes, and nothing may be loaded: a script in a title stays a text.
+    hashes = " ".join(_hash(text) for text in (script, *library.values()))
+    policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("springtune.studies.output", "assets"), autoescape=True, trim_blocks=True
+    )
+    environment.filters |= FILTERS
+    return environment.get_template("page.html").render(
+        title=attributes.get("title") or attributes.get("study") or "Study",
+        policy=f"{policy}; form-action 'none'",
+        style=Markup(_asset("style.css")),
+        script=Markup(script),
+        attributes=attributes,
+        files=sorted(files),
+        overview=found,
+        blocks={name: _compress(text.encode()) for name, text in texts.items()},
+    )
+
+
+def _asset(name: str) -> str:
+    return (Path(__file__).parent / "assets" / name).read_text(encoding="utf-8")
+
+
+def _compress(content: bytes) -> str:
+    return base64.b64encode(zlib.compress(content, 9)).decode()
+
+
+def _library() -> dict[str, str]:
+    """Read the scripts of BokehJS; importing Bokeh would take longer than making the page."""
+    found = find_spec("bokeh")
+    if found is None or found.origin is None:
+        raise FileNotFoundError("the package bokeh is not installed; `pip install bokeh` or `make study` installs it")
+    folder = Path(found.origin).parent / "server/static/js"
+    return {name: (folder / f"{name}.min.js").read_text(encoding="utf-8") for name in BOKEH_SCRIPTS}
+
+
+def _hash(script: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+# -- packed numbers ----------------------------------------------------------------------------------------------------
+
+LONG_DIMENSION = 16
+"""Fewest labels of a last dimension that counts as points along a line."""
+
+CELL_BITS_CLEARED, LINE_BITS_CLEARED = 6, 9
+"""Cleared bits of 23: 5 digits of a number are left, and 4 of a point on a line, finer than a pixel."""
+
+EMPTY_TEXT = -1
+"""Number of an empty text."""
+
+MOST_CHARACTERS = 4_200_000
+"""Most characters of all numbers: the page with its library stays below 5 MB."""
+
+
+def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
+    """Describe and pack the groups of a dataset; leave out and name the largest variables if there is no room."""
+    children = [group for group in file.groups.values() if group.variables]
+    groups = [_describe(group, group.variables, file.variables) for group in (file, *children)]
+    rows = [(group, row) for group in groups for row in group["variables"]]
+    excess = sum(len(row["data"]) for _, row in rows) - room
+    # Cells last: without them there is no table.
+    for group, row in sorted(rows, key=lambda pair: (pair[0]["path"] == "/", -len(pair[1]["data"]))):
+        if excess > 0:
+            group["left_out"].append(row["name"])
+            group["variables"].remove(row)
+            excess -= len(row["data"])
+    return groups
+
+
+StoredVariables = Mapping[str, h5netcdf.Variable]
+
+
+def _describe(group: h5netcdf.Group, own: StoredVariables, root: StoredVariables) -> dict[str, Any]:
+    """Describe and pack a group: its `own` variables, with labels that it may share with the `root`."""
+    rows: list[dict[str, Any]] = []
+    sizes: dict[str, int] = {}
+    for name, stored in own.items():
+        if stored.dimensions == (name,):
+            sizes[name] = len(stored)
+            continue
+        row: dict[str, Any] = {"name": name, "dims": list(stored.dimensions)} | _words_on(stored)
+        if "flag_meanings" in stored.attrs:
+            meanings = str(stored.attrs["flag_meanings"]).split()
+            flags = np.ravel(stored.attrs.get("flag_values", range(len(meanings)))).tolist()
+            row["flags"] = dict(zip(map(str, flags), meanings))
+        values = _values(stored)  # each read, packed and forgotten
+        sizes |= dict(zip(stored.dimensions, values.shape))
+        if name == "status":
+            values = _mark_beyond_linear(own, row, values)
+        elif ERROR.search(name) and row.get("units", "1") == "1":
+            row["error"] = True
+            if _has_sign(row, values):
+                row |= {"signed": True, "sign": _sign_sentence(name, own, root)}
+        rows.append(row | _pack_values(values))
+    dims = [{"name": name, "size": size} | _labels(name, own, root) for name, size in sizes.items()]
+    attributes = {name: _json_value(value) for name, value in group.attrs.items() if name != "coordinates"}
+    return {"path": group.name, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
+
+
+def _labels(name: str, own: StoredVariables, root: StoredVariables) -> dict[str, Any]:
+    """Labels of a dimension with their unit and name; empty if it has none."""
+    stored = own.get(name) or root.get(name)
+    return {"labels": list(map(_json_value, stored[...].tolist()))} | _words_on(stored) if stored else {}
+
+
+def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
+    """Unit and name of a variable."""
+    return {name: str(stored.attrs[name]) for name in ("units", "long_name") if name in stored.attrs}
+
+
+def _read(group: h5netcdf.Group, root: h5netcdf.File) -> dict[str, tuple[Sequence[str], np.ndarray]]:
+    """Dimensions and values of a group's numbers and labels, and of those labels that it shares with the root."""
+    dims = {name for stored in group.variables.values() for name in stored.dimensions}
+    labels = {name: root.variables[name] for name in dims if name in root.variables}
+    found = {}
+    for name, stored in (labels | dict(group.variables)).items():
+        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf" or name == REMARK:
+            found[name] = (stored.dimensions, _values(stored))
+    return found
+
+
+def _values(stored: h5netcdf.Variable) -> np.ndarray:
+    """Values of an array; missing integers are NaN."""
+    values, fill = stored[...], stored.attrs.get("_FillValue")
+    return np.where(values == fill, np.nan, values) if fill is not None and values.dtype.kind in "iu" else values
+
+
+def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
+    return broadcast(dims, stored.dimensions, stored[...])
+
+
+# -- errors ------------------------------------------------------------------------------------------------------------
+
+ERROR = re.compile(r"(^|_)errors?(?!_rate|_estimate)(_|$)")
+"""Names of errors; rates and estimates have no sign."""
+
+REFERENCES = {
+    "face_error": "reference_face_displacement",
+    "error": "reference_value",
+    "expected_error": "expected_value",
+}
+"""Reference variables of errors, if not `reference_displacement`."""
+
+
+def _mark_beyond_linear(own: StoredVariables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
+    """Give solved cells that the linear reference cannot judge a status of their own."""
+    flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
+    applies = own.get("reference_applies")
+    if "solved" not in flags or applies is None or not set(applies.dimensions) <= set(row["dims"]):
+        return status
+    beyond = max(flags.values()) + 1
+    found = np.where((status == flags["solved"]) & (_broadcast(applies, row["dims"]) == 0), beyond, status)
+    if (found == beyond).any():
+        row["flags"][str(beyond)] = "beyond_linear"
+    return found
+
+
+def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
+    """Return whether an error has a sign; norms and numbers printed without one have none."""
+    said = row.get("long_name", "")
+    stated = re.search(r"signed|less 1|- 1$|network - reference", said)
+    return "without sign" not in said and bool(stated or (values < 0).any())
+
+
+def _sign_sentence(name: str, own: StoredVariables, root: StoredVariables) -> str:
+    """Sentence on which sign of a group's errors means too soft."""
+    reference = REFERENCES.get(name, "reference_displacement")
+    reference = reference if reference in own else "reference_displacement"
+    group = own if reference in own else root
+    if reference not in group or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
+        return "positive: too large"
+    dims, others = group[reference].dimensions, False
+    values = group[reference][...]
+    if "quantity_kind" in group:
+        displacements = _broadcast(group["quantity_kind"], dims) == "displacement"
+        others = bool((np.isfinite(values) & ~displacements).any())
+        values = np.where(displacements, values, np.nan)
+    axes = {one: _labels(one, own, root).get("labels", ()) for one in dims}
+    said = sign_of_displacements(values, axes)
+    if not others:
+        return said
+    return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
+
+
+# -- arrays ------------------------------------------------------------------------------------------------------------
+
+
+def _json_value(value: Any) -> Any:
+    """Convert a label or an attribute for JSON, which has no NaN."""
+    if isinstance(value, np.ndarray):
+        return [_json_value(one) for one in value.tolist()]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if isinstance(value, bool | int | float | str) else str(value)
+
+
+def _pack_values(values: np.ndarray) -> dict[str, Any]:
+    if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
+        with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
+            numbers = values.real.astype(np.float32)
+        return _pack({"type": "float"}, numbers, ~np.isnan(numbers))
+    if values.dtype.kind in "iub":
+        return _pack({"type": "integer"}, values.astype(np.int32), values != 0)
+    # No array of texts, which gives each the room of the longest one.
+    texts = list(map(str, (values if values.dtype.kind == "O" else values.astype(str)).ravel().tolist()))
+    words = sorted(set(texts))
+    numbers_of = {word: number if word else EMPTY_TEXT for number, word in enumerate(words)}
+    places = np.fromiter(map(numbers_of.__getitem__, texts), np.int32, len(texts)).reshape(values.shape)
+    return _pack({"type": "text", "words": words}, places, places != EMPTY_TEXT)
+
+
+def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
+    """Pack an array: its bytes and how to read them."""
+    long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
+    points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
+    numbers = values.reshape(-1, points)
+    parts = []
+    row["points"] = points
+    if long:
+        kept = present.reshape(-1, points).any(axis=1)
+        row["kept"] = int(kept.sum())
+        parts.append(np.packbits(kept, bitorder="little").tobytes())
+        numbers = numbers[kept]
+    if row["type"] == "float":
+        row["cleared"] = LINE_BITS_CLEARED if points > 1 else CELL_BITS_CLEARED
+        numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)  # all NaN are equal
+        bits = numbers.view(np.int32).copy()
+        bits[np.isfinite(numbers)] += 1 << (row["cleared"] - 1)
+        bits >>= row["cleared"]
+    else:
+        bits = np.ascontiguousarray(numbers)
+    if points > 1:
+        # Integer differences wrap around, as they do in the page.
+        bits = np.diff(bits, axis=1, prepend=np.int32(0))
+    folded = (bits << 1) ^ (bits >> 31)
+    parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
+    return row | {"data": _compress(b"".join(parts))}
+
+
+# -- the overview that a page opens on, without a script ---------------------------------------------------------------
+
+Content = dict[str, Any]
+"""Values that a template shows."""
+
+
+class Source(NamedTuple):
+    """A group with errors of definitions: its cells, their error and body, and what the dots of a definition are by."""
+
+    group: str
+    cells: str
+    error: str
+    body: str
+    by: str
+
+
+SOURCES = (
+    Source("/", "scenes", "deformation_error", "beam", "load"),
+    Source("/shapes", "quantities of shapes", "error", "shape", "shape"),
+    Source("/samples", "samples", "deformation_error", "", "load"),
+)
+
+GROUPS = {*(source.group for source in SOURCES), "/finite_strain", "/sensitivity"}
+"""Groups that the overview reads."""
+
+REMARK = "paper_remark"
+"""Variable that says where the print contradicts itself."""
+
+LOOKS = 8
+"""Different colours of lines and dots."""
+
+SMALLEST_PERCENT = 1e-4
+"""Smaller errors stand at the end of their axis."""
+
+SHORTEST_TIME = 1e-6
+"""Shorter times [s] stand at the end of their axis."""
+
+LARGEST_CURVE_PERCENT = 60.0
+"""Largest error of a sensitivity curve."""
+
+PANEL_LABELS = ("mesh_type", "material", "load", "kinematics")
+"""Labels of a chart of sensitivity curves."""
+
+MOST_PANELS, MOST_LINES, MOST_ANSWERS = 12, 12, 24
+"""Most charts of sensitivity curves and tables, curves in each chart, and rows on what to type."""
+
+
+class Axis:
+    """An axis, with `ticks` of a place in percent and a text."""
+
+    def __init__(self, label: str, values: Iterable[float], log: bool = False) -> None:
+        low, high = np.min([*values]), np.max([*values])
+        if log:
+            first = np.floor(np.log10(low))
+            steps = 10.0 ** np.arange(first, max(np.ceil(np.log10(high)), first + 1) + 1)
+        else:
+            step = 10.0 ** np.ceil(np.log10(max(high - low, 1e-3 * abs(high), 1e-9)))
+            step *= next(share for share in (0.02, 0.05, 0.1, 0.2) if high - low <= 6 * share * step)
+            steps = step * np.arange(np.floor(low / step), np.ceil(high / step) + 1)
+        self.label, self.log, self.ends = label, log, (steps[0], steps[-1])
+        self.ticks = [(self.at(one), f"{one:g}") for one in steps]
+
+    def at(self, value: float) -> float:
+        """Place of a value."""
+        low, high, place = np.log10([*self.ends, value]) if self.log else (*self.ends, value)
+        return round(100 * float((place - low) / (high - low)), 1)
+
+
+ERROR_AXIS = "error, without sign [%]"
+CURVE_AXIS = Axis("error [%]", [-LARGEST_CURVE_PERCENT, LARGEST_CURVE_PERCENT])
+
+
+class Chart(NamedTuple):
+    """A chart, with places in percent of its axes."""
+
+    x: Axis
+    y: Axis | None
+    rows: Sequence[tuple[float, str, str]] = ()  # place, name and numbers, instead of an axis
+    lines: Sequence[tuple[int, Sequence[tuple[float, float]]]] = ()  # look and points
+    dots: Sequence[tuple[str, float, float, str]] = ()  # look, place and text
+    names: Mapping[str, int] = {}  # looks of lines or dots
+    title: str = ""
+
+
+def overview(groups: Mapping[str, Variables]) -> Content:
+    """Content of the overview of a dataset's groups."""
+    found, root, curves = [], groups.get("/", {}), groups.get("/sensitivity", {})
+    for source in SOURCES:
+        group = groups.get(source.group, {})
+        if {source.error, "status", "definition"} <= {*group}:
+            finite = groups.get("/finite_strain", {}) if source.group == "/" else {}
+            content = _errors(source, requested_cells(group, finite, source.error))
+            found.append(content | {"finite_strain": has_own_law(finite)})
+    return {
+        "sources": found,
+        "curves": _curves({**root, **curves}) if "deformation_error" in curves else {},
+        "paper": _paper_tables(requested_cells(root)) if "paper_table" in root else {},
+    }
+
+
+# -- what to type, errors and times ------------------------------------------------------------------------------------
+
+
+def _errors(source: Source, cells: Columns) -> Content:
+    """What to type, errors of definitions, and errors over run time."""
+    found = sorted(definition_errors(cells), key=lambda one: one.median)
+    answers = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
+    content: Content = {"source": source, "answers": answers[:MOST_ANSWERS], "further": len(answers) - MOST_ANSWERS}
+    if found:
+        percents = np.maximum(100 * np.abs(cells["valid_error"]), SMALLEST_PERCENT)
+        content["errors"] = _dots(found, percents, cells[source.by], cells["valid_error"])
+        if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
+            pairs = {*zip(cells[source.body].tolist(), cells["mesh_size"].tolist())}
+            alike = len(pairs) == len({body for body, _ in pairs}) * len({size for _, size in pairs})
+            # Where each body has mesh sizes of its own, medians by mesh size would be of different bodies.
+            sizes = [_size(size) if alike else "" for size in cells["mesh_size"].tolist()]
+            seconds = np.nan_to_num(cells["solve_seconds"] + cells["definition_seconds"])
+            content["times"] = _times(found[:LOOKS], percents, np.array(sizes), seconds)
+    return content
+
+
+def _size(mesh_size: float) -> str:
+    return label_text("mesh_size", mesh_size, "m")
+
+
+def _stiffnesses(values: np.ndarray) -> str:
+    return re.sub(r"e\+0?", "e", range_text(values)) + " N/m"
+
+
+FILTERS = {"size": _size, "stiffnesses": _stiffnesses, "error": error_text}
+"""Filters of the template."""
+
+
+def _dots(found: Sequence[DefinitionErrors], percents: np.ndarray, labels: np.ndarray, errors: np.ndarray) -> Chart:
+    """Errors of each definition: medians by label, of all, and the worst."""
+    x, dots, rows = Axis(ERROR_AXIS, percents[np.concatenate([one.places for one in found])], log=True), [], []
+    names = {label: number % LOOKS for number, label in enumerate(dict.fromkeys(labels.tolist()))}
+    for row, one in enumerate(found):
+        y, own = 100 - 100 * (row + 0.5) / len(found), percents[one.places]
+        median, worst = f"{100 * one.median:.2g} %", error_text(errors[one.worst])
+        rows.append((y, ", ".join(one.labels), f"{median}; {worst}"))
+        for label, look in names.items():
+            if (mine := own[labels[one.places] == label]).size:
+                size = float(np.median(mine))
+                dots.append((f"look{look}", x.at(size), y, f"{label}: median {size:.2g} %"))
+        dots.append(("worst", x.at(own.max()), y, f"worst: {worst}"))
+        dots.append(("median", x.at(np.median(own)), y, f"median: {median}"))
+    return Chart(x, None, rows, dots=dots, names=names)
+
+
+def _times(found: Sequence[DefinitionErrors], percents: np.ndarray, sizes: np.ndarray, seconds: np.ndarray) -> Chart:
+    """Median error over median run time, a line a definition through its mesh sizes."""
+    medians = {}
+    for one in found:
+        parts = {size: one.places[sizes[one.places] == size] for size in dict.fromkeys(sizes[one.places].tolist())}
+        medians[", ".join(one.labels)] = [(size, float(np.median(seconds[places])), float(np.median(percents[places])))
+                                          for size, places in parts.items()]  # fmt: skip
+    _, times, errors = zip(*(row for rows in medians.values() for row in rows))
+    x, y = Axis("run time [s]", np.maximum(times, SHORTEST_TIME), log=True), Axis(ERROR_AXIS, errors, log=True)
+    lines, dots = [], []
+    for look, (name, rows) in enumerate(medians.items()):
+        places = [(x.at(max(time, SHORTEST_TIME)), y.at(error)) for _, time, error in rows]
+        texts = [f"{name}, {size}: {error:.2g} %, {time:.2g} s".replace(", :", ":") for size, time, error in rows]
+        lines.append((look, places))
+        dots += [(f"look{look}", *place, text) for place, text in zip(places, texts)]
+    return Chart(x, y, lines=lines, dots=dots, names={name: look for look, name in enumerate(medians)})
+
+
+# -- sensitivity curves ------------------------------------------------------------------------------------------------
+
+
+def _curves(curves: Variables) -> Content:
+    """Charts of the error over k / (E t), one for each mesh type, material and load: nonlinear where there is one."""
+    dims, errors = curves["deformation_error"]
+    labels = {name: curves[name][1].tolist() for name in dims}
+    panels: dict[tuple[str, ...], list[tuple[Content, tuple[int, ...]]]] = {}
+    for place in map(tuple, np.argwhere(np.isfinite(errors).any(axis=-1))):
+        cell = {name: labels[name][at] for name, at in zip(dims, place)}
+        panels.setdefault(tuple(cell[name] for name in PANEL_LABELS), []).append((cell, place))
+    shown = [panel for panel in panels if panel[-1] == "nonlinear" or (*panel[:-1], "nonlinear") not in panels]
+    looks = {_size(size): number % LOOKS for number, size in enumerate(labels["mesh_size"])}
+    x, charts = Axis("k / (E t)", curves["stiffness_ratio"][1]), []
+    for panel in shown[:MOST_PANELS]:
+        lines, dots, members = [], [], panels[panel]
+        for cell, place in members[:MOST_LINES]:
+            size = _size(cell["mesh_size"])
+            points, marks = _curve(curves, place, x)
+            lines.append((looks[size], points))
+            for name, at, stiffness in marks:
+                text = f"{cell['beam']}, {size}, {name}: {stiffness:.4g} N/m"
+                dots.append((f"{name} look{looks[size]}", at, CURVE_AXIS.at(0), text))
+        more = f"; {len(members) - MOST_LINES} curves more" if len(members) > MOST_LINES else ""
+        charts.append(Chart(x, CURVE_AXIS, lines=lines, dots=dots, title=", ".join(panel) + more))
+    seen = {dot[0].split()[0] for chart in charts for dot in chart.dots}
+    return {"charts": charts, "names": looks, "seen": seen, "further": len(shown) - MOST_PANELS}
+
+
+def _curve(curves: Variables, place: tuple[int, ...], x: Axis) -> tuple[list[Any], list[tuple[str, float, float]]]:
+    """Points of a curve, and name, place and value of its predicted and its best stiffness."""
+    ratios, percents = curves["stiffness_ratio"][1], 100 * curves["deformation_error"][1][place]
+    kept = np.abs(percents) <= LARGEST_CURVE_PERCENT
+    points = [(x.at(one), CURVE_AXIS.at(other)) for one, other in zip(ratios[kept], percents[kept])]
+    membrane = float(np.nanmedian(curves["stiffness"][1][place] / ratios))
+    marks = [(name, float(curves[f"{name}_stiffness"][1][place])) for name in ("predicted", "best")]
+    return points, [(name, x.at(stiffness / membrane), stiffness) for name, stiffness in marks
+                    if ratios[0] <= stiffness / membrane <= ratios[-1]]  # fmt: skip
+
+
+# -- the paper's tables ------------------------------------------------------------------------------------------------
+
+
+def _paper_tables(cells: Columns) -> Content:
+    """Tables of the paper: printed numbers, and beside them our reference and errors of definitions."""
+    printed = np.flatnonzero(np.isfinite(cells["paper_table"]))
+    tables: dict[str, dict[Any, Content]] = {}
+    kinematics: dict[str, str] = {}  # that of each definition which is shown: nonlinear if there is one
+    for one in sorted(definition_errors(cells), key=lambda one: (one.labels[0] != "paper", one.median)):
+        name, own = one.labels
+        kinematics[name] = own if own == "nonlinear" else kinematics.get(name, own)
+    for place in printed:
+        cell: Content = {name: values[place] for name, values in cells.items()}
+        title = f"Table {cell['paper_table']:g}: {cell['load']}, {cell['mesh_type']}, {cell['material']}"
+        row = tables.setdefault(title, {}).setdefault((cell["beam"], f"{1e3 * cell['mesh_size']:.4g}"), {
+            "printed": (f"{1e3 * cell['paper_reference_displacement']:.3f}", f"{1e3 * cell['paper_displacement']:.2f}",
+                        f"{100 * cell['paper_deformation_error']:.2f}" + "*" * bool(cell.get(REMARK))),
+            "reference": f"{1e3 * cell['reference_displacement']:.3f}", "errors": {},
+        })  # fmt: skip
+        if cell["kinematics"] == kinematics.get(cell["definition"]):
+            solved = cell["status"] == Status.SOLVED
+            text = (
+                f"{100 * cell['deformation_error']:+.2f}" if solved else str(Status(cell["status"])).replace("_", " ")
+            )
+            row["errors"][cell["definition"]] = text
+    return {"tables": dict(sorted(tables.items())[:MOST_PANELS]), "kinematics": kinematics}
+
+
+def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
+    """Write the page of a dataset, and the record of it."""
+    write_text(output, page(dataset, files))
+    write_json(record, {"digest": digest})
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
