@@ -21,10 +21,7 @@ _NAMES = {
     "handover.net": ("SpringNet",),
     "studies.kinds": ("load_study",),
     "studies.kinds.benchmark.figures": ("plot_benchmark",),
-    "studies.kinds.engines.figures": (
-        "plot_engine_curves",
-        "plot_engine_errors",
-    ),
+    "studies.kinds.engines.figures": ("plot_engine_curves", "plot_engine_errors"),
     "studies.kinds.laying.figures": ("plot_laying",),
     "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_moduli"),
     "studies.kinds.samples.figures": ("plot_sobol",),

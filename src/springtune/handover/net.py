@@ -377,12 +377,7 @@ def described(definition: Definition) -> tuple[str, str]:
 
 
 def _expected_errors(
-    sheet: MeshCache,
-    definition: Definition,
-    springs: Springs,
-    beam: Beam,
-    material: Material,
-    loads: Sequence[str],
+    sheet: MeshCache, definition: Definition, springs: Springs, beam: Beam, material: Material, loads: Sequence[str]
 ) -> dict[str, float | str]:
     """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.

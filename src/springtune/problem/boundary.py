@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ..mesh.cells import Mesh, signed_areas
-from ..mesh.sheets import GroupedMesh, check_held, part_names
+from ..mesh.cells import Mesh, no_cells, signed_areas
+from ..mesh.sheets import GroupedMesh, check_held, part_names, parts_of
 from ..mesh.sides import in_words
 from .loads import MIDDLE, LoadKind, Side
 from .shapes import LoadCase, Quantity
@@ -115,27 +115,22 @@ def forces(
 
 def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the edges (n, 2) with follower pressure, the body to the left, and it (n,) times the thickness [N/m]."""
-    edges, pressures = [np.zeros((0, 2), dtype=np.int64)], [0.0]
-    for one in case.pressures:
-        if one.follower:
-            edges.append(grouped.sides[one.group])
-            pressures.append(one.pressure * thickness)
-    return np.concatenate(edges), np.repeat(pressures, [len(part) for part in edges])
+    found = [(grouped.sides[one.group], one.pressure * thickness) for one in case.pressures if one.follower]
+    edges, pressures = zip((no_cells(2), 0.0), *found)
+    return np.concatenate(edges), np.repeat(pressures, [*map(len, edges)])
 
 
 def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
     """Return lumped masses [kg] (n_points,) from densities [kg/m3] by part, the main one at ``""``."""
     points, labels = grouped.mesh.points, part_names(grouped)
     masses = np.zeros(len(points))
+    for name in parts_of(grouped):
+        if densities.get(name) is None:
+            body = f"part {name!r}" if name else "the body"
+            raise ValueError(f"density: the material of {body} has none; give one such as '7850 kg/m^3'")
     for count, corners in grouped.mesh.cells.items():
-        names, which = np.unique(labels[count], return_inverse=True)
-        for name in names:
-            if densities.get(str(name)) is None:
-                said = f"part {str(name)!r}" if name else "the body"
-                raise ValueError(f"density: the material of {said} has none; give one such as '7850 kg/m^3'")
-        density = np.array([densities[str(name)] for name in names], dtype=float)[which]
-        areas = signed_areas(points, corners)
-        np.add.at(masses, corners, (density * thickness * areas / count)[:, None])
+        density = np.array([densities[name] for name in labels[count]], dtype=float)
+        np.add.at(masses, corners, (density * thickness * signed_areas(points, corners) / count)[:, None])
     return masses
 
 
@@ -226,8 +221,7 @@ def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
     held_and_pulled = [("support", one.group) for one in case.supports]
     held_and_pulled += [("traction", one.group) for one in case.tractions]
     for name in dict.fromkeys([*pressed, *(name for _, name in held_and_pulled), *(one.of for one in case.quantities)]):
-        fault = grouped.side_fault(name, directed=name in pressed) if name in grouped.sides else ""
-        if fault:
+        if name in grouped.sides and (fault := grouped.side_fault(name, directed=name in pressed)):
             raise ValueError(f"{where}: {name!r} {fault}")
     for what, name in held_and_pulled:
         if name in grouped.points and grouped.particle(name) is None:

@@ -106,9 +106,6 @@ def _root(
 ) -> float:
     """Stiffness between two softnesses at which the displacement is the reference's."""
     known = {first: error_first, last: error_last}
-    if 0.0 in known.values():
-        return float(1.0 / next(softness for softness, error in known.items() if error == 0))
-
     from scipy.optimize import brentq  # here: most jobs that compare look for no best stiffness
 
     def error(softness: float) -> float:

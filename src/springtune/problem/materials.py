@@ -371,10 +371,7 @@ class AnisotropicMaterial:
 
     @classmethod
     def laminate(
-        cls,
-        plies: Sequence[tuple[AnyMaterial, Number, Number]],
-        density: Number | None = None,
-        name: str = "laminate",
+        cls, plies: Sequence[tuple[AnyMaterial, Number, Number]], density: Number | None = None, name: str = "laminate"
     ) -> AnisotropicMaterial:
         """Make one sheet of bonded plies: the mean of their stiffnesses by thickness.
 

@@ -244,12 +244,11 @@ def _round(segments: Sequence[Segment], what: str) -> tuple[OutlineSide, ...]:
     if len(segments) < least:
         raise ValueError(f"{what}: has {len(segments)} sides, and a round has 3 or more, with arcs 2; add sides")
     sides = []
-    for number, segment in enumerate(segments):
-        end = segments[(number + 1) % len(segments)].start
+    for number, (one, after) in enumerate(zip(segments, [*segments[1:], segments[0]]), 1):
         try:
-            sides.append(OutlineSide(segment.start, end, segment.centre, segment.group))
+            sides.append(OutlineSide(one.start, after.start, one.centre, one.group))
         except ValueError as error:
-            raise ValueError(f"{what}, side {number + 1}: {error}") from None
+            raise ValueError(f"{what}, side {number}: {error}") from None
     return tuple(sides)
 
 
@@ -313,14 +312,7 @@ class Hole:
         return cls.ellipse(centre, radius, radius, group, part)
 
     @classmethod
-    def ellipse(
-        cls,
-        centre: Place,
-        across: Number,
-        along: Number,
-        group: str | None = None,
-        part: str = "",
-    ) -> "Hole":
+    def ellipse(cls, centre: Place, across: Number, along: Number, group: str | None = None, part: str = "") -> "Hole":
         """Make an ellipse of four arcs.
 
         Parameters
@@ -566,27 +558,19 @@ class LoadCase:
         kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
         for name, kind in kinds.items():
             put(self, **{name: _tuple_of(getattr(self, name), kind, f"{what}, {name}")})
-        try:
-            gravity = tuple(float(one) for one in self.gravity)
-        except (TypeError, ValueError):
-            gravity = ()
-        if len(gravity) != 2 or not all(map(math.isfinite, gravity)):
-            raise ValueError(f"{what}, gravity: {self.gravity!r}; give x and y such as (0, -9.81), in m/s2")
-        put(self, gravity=gravity)
+        put(self, gravity=_vector(self.gravity, "acceleration", f"{what}, gravity", "(0, -9.81), in m/s2"))
         if not self.supports:
             raise ValueError(f"{what}: has no supports, so nothing keeps the body in its place; add some")
         for axis in ("x", "y"):
             held = [support.group for support in self.supports if getattr(support, axis) is not None]
-            twice = [group for group in held if held.count(group) > 1]
-            if twice:
+            if twice := [group for group in held if held.count(group) > 1]:
                 raise ValueError(f"{what}: supports hold {twice[0]!r} along {axis} twice; remove one of them")
         moved = any(support.x or support.y for support in self.supports)
-        if not (moved or self.tractions or self.pressures or any(gravity)):
+        if not (moved or self.tractions or self.pressures or any(self.gravity)):
             remedy = "give forces, or a support such as {end: {x: 1 mm}}"
             raise ValueError(f"{what}: neither moves nor pulls the body; {remedy}")
         names = [one.name for one in self.quantities]
-        twice = [name for name in names if names.count(name) > 1]
-        if twice:
+        if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{what}: two quantities are named {twice[0]!r}; rename one")
 
     def check_names(
@@ -736,17 +720,14 @@ class Shape:
         rounds = [("outline", sides)]
         rounds += [(f"hole {number}", _round(hole.outline, "hole")) for number, hole in enumerate(self.holes, start=1)]
         for what, one in rounds:
-            short = [
-                number for number, side in enumerate(one, start=1) if math.dist(*extent([side])) < SIDE_TOLERANCE * size
-            ]
+            short = [i for i, side in enumerate(one, 1) if math.dist(*extent([side])) < SIDE_TOLERANCE * size]
             if short:
                 raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
             for before, side in zip((one[-1], *one[:-1]), one):
                 (x, y), (u, v) = before.tangent(1.0), side.tangent(0.0)
                 if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6:
                     raise ValueError(f"{what}: turns back on itself at {in_words(side.start)}; move a corner")
-        met = find_meeting([one for _, one in rounds])
-        if met:
+        if met := find_meeting([one for _, one in rounds]):
             (first, i), (second, j), where = met
             if first == second:
                 both = f"sides {i + 1} and {j + 1} meet"
@@ -762,9 +743,8 @@ class Shape:
         if enclosed(sides) < 0:
             back = tuple(Segment(one.start, one.centre, one.group) for one in reversed_round(sides))
             put(self, outline=back)
-        names = set(self.groups) & set(self.points)
-        if names:
-            raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")
+        if names := sorted({*self.groups} & {*self.points}):
+            raise ValueError(f"{names[0]!r} names a point and sides; rename one of them")
 
     def _place_point(self, name: str, point: Point) -> Point:
         """A named point, on the side that it is next to."""
@@ -780,9 +760,8 @@ class Shape:
             raise ValueError(f"point {name!r}: {in_words(point)} is not in the body; move it")
         for other, place in self.points.items():
             if 0 < math.dist(point, place) <= near:
-                raise ValueError(
-                    f"points {name!r} and {other!r}: are as good as one at {in_words(point)}; make them one"
-                )
+                both = f"points {name!r} and {other!r}"
+                raise ValueError(f"{both}: are as good as one at {in_words(point)}; make them one")
         return point
 
     @cached_property
