@@ -228,16 +228,16 @@ LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
 def write_vtu_with(
     path: str | Path,
     net: Net,
-    of_particles: Mapping[str, np.ndarray],
-    of_springs: Mapping[str, np.ndarray],
+    of_particles: Mapping[str, np.ndarray] | None = None,
+    of_springs: Mapping[str, np.ndarray] | None = None,
     numbers: Mapping[str, float] | None = None,
-) -> None:
+) -> list[Path]:
     """Write a net for ParaView, with more data of its particles, (n_points,) or (n_points, 2), and of its springs."""
     arrays = arrays_of(net)
     data = {new: arrays[old] for old, new in POINT_NAMES.items() if old in arrays}
     data["held"] = data["held"].astype(np.int8)
     cell_data = {new: {2: arrays[old]} for old, new in LINE_NAMES.items()}
-    cell_data |= {name: {2: values} for name, values in of_springs.items()}
+    cell_data |= {name: {2: values} for name, values in (of_springs or {}).items()}
     for count, columns in _by_corners(net.energies).items():
         for name, values in columns.items():
             cell_data.setdefault(name, {})[count] = values
@@ -245,22 +245,18 @@ def write_vtu_with(
         path,
         arrays["points"],
         {2: arrays["springs"], 3: arrays["triangles"], 4: arrays["quads"]},
-        data | dict(of_particles),
+        data | dict(of_particles or {}),
         cell_data,
         {"thickness": net.header["thickness"]} | dict(numbers or {}),
         json.dumps(net.header, indent=1),
     )
+    return [Path(path)]
 
 
 # -- formats -------------------------------------------------------------------------------------------------------
 
 
-def _write_vtu(path: Path, net: Net) -> list[Path]:
-    write_vtu_with(path, net, {}, {})
-    return [path]
-
-
-NET_FORMATS = {".csv": _write_csv, ".json": _write_json, ".vtu": _write_vtu}
+NET_FORMATS = {".csv": _write_csv, ".json": _write_json, ".vtu": write_vtu_with}
 """Functions that write a net, by the ending of the name of its file."""
 
 FOR_MUJOCO = (".xml", ".mjcf")
@@ -328,5 +324,4 @@ def write_displaced(path: str | Path, scene: Scene, displacements: np.ndarray, c
             net.header["reference"] = scene.objection or f"finite elements, {strain} strain, converged"
     forces = scene.springs.reference * scene.network.spring_forces_over_k(displacements, scene.kinematics == "linear")
     numbers = {"displacement_of_the_load": scene.displacement_of(displacements)}
-    write_vtu_with(path, net, of_particles, {"force": forces}, numbers)
-    return [path]
+    return write_vtu_with(path, net, of_particles, {"force": forces}, numbers)

@@ -6,7 +6,7 @@ Its energy W is the sum of ``k (l - L)^2 / 2`` over springs and of the `Terms` o
 import inspect
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -157,25 +157,18 @@ class SpringNet(Tabled, Net):
         springs = scene.springs if springs is None else springs
         about, forces = scene.boundary_problem, scene.boundary_problem.forces(springs)
         parts = _parts(scene.definition, scene.sheet, about.materials, springs, about.masses(), mesh_name, scene.held)
-        header = parts["header"]
-        scale = about.scale if isinstance(about, ShapeProblem) else None
-        header["load"] = {
-            "name": scene.load,
-            **({"force": about.force} if scale is None else {"scale": scale}),
-            "kinematics": scene.kinematics,
-            "follower": about.loading.follower is not None,
-            **({} if scale is None else {"prescribed": about.loading.given is not None}),
-        }
-        header |= {"beam": _beam(scene.beam)} if scale is None else {"shape": about.body}
-        if errors and scale is not None:
+        header, follower = parts["header"], about.loading.follower is not None
+        load = {"name": scene.load, "kinematics": scene.kinematics, "follower": follower}
+        if isinstance(about, ShapeProblem):
+            load |= {"scale": about.scale, "prescribed": about.loading.given is not None}
+            header |= {"load": load, "shape": about.body}
+        else:
+            header |= {"load": load | {"force": about.force}, "beam": asdict(scene.beam)}
+        if errors and isinstance(about, ShapeProblem):
             header |= {"expected_error": _errors_on_shape(scene, springs), "expected_error_means": MEANING_ON_SHAPES}
         elif errors:
-            from ..prediction.choices import USUAL_LOADS  # here, since finite elements take half a second to import
-
-            loads = tuple(dict.fromkeys((*USUAL_LOADS, scene.load)))
-            header["expected_error"] = _expected_errors(
-                scene.sheet, scene.definition, springs, scene.beam, scene.material, loads
-            )
+            body = scene.beam, scene.material
+            header["expected_error"] = _expected_errors(scene.sheet, scene.definition, springs, *body, None, scene.load)
         return cls(**(parts | {"forces": forces}))
 
     @classmethod
@@ -243,12 +236,9 @@ class SpringNet(Tabled, Net):
         if beam is None:
             header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
         else:
-            header["beam"] = _beam(beam)
+            header["beam"] = asdict(beam)
             if errors:
-                from ..prediction.choices import USUAL_LOADS, check_loads
-
-                names = check_loads(USUAL_LOADS if loads is None else loads)
-                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, names)
+                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, loads)
         return cls(**parts)
 
     def write(self, path: str | Path) -> list[Path]:
@@ -362,10 +352,6 @@ def _parts(
     }
 
 
-def _beam(beam: Beam) -> dict[str, Any]:
-    return {"name": beam.name, "length": beam.length, "height": beam.height, "thickness": beam.thickness}
-
-
 def described(definition: Definition) -> tuple[str, str]:
     """Formula of a definition in words, and where it comes from."""
     function = inspect.unwrap(definition.function)
@@ -377,17 +363,24 @@ def described(definition: Definition) -> tuple[str, str]:
 
 
 def _expected_errors(
-    sheet: MeshCache, definition: Definition, springs: Springs, beam: Beam, material: Material, loads: Sequence[str]
+    sheet: MeshCache,
+    definition: Definition,
+    springs: Springs,
+    beam: Beam,
+    material: Material,
+    loads: Iterable[str] | None,
+    *further: str,
 ) -> dict[str, float | str]:
     """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import errors_under, reference_of
+    from ..prediction.choices import USUAL_LOADS, check_loads, errors_under, reference_of
 
+    names = (*check_loads(USUAL_LOADS if loads is None else loads), *further)
     if why := _too_many(sheet):
-        return dict.fromkeys(loads, why)
+        return dict.fromkeys(names, why)
     why = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
-    errors: dict[str, float | str] = dict.fromkeys(loads, why)
-    for name in loads:
+    errors: dict[str, float | str] = dict.fromkeys(names, why)
+    for name in errors:
         if LOADS[name].kind.uniaxial or not definition.uniaxial:
             known = {name: reference_of(beam, material, name)}
             problem = BeamProblem(beam, sheet.mesh, material, name, 1.0, "linear", sheet)
