@@ -3,26 +3,22 @@
 import gc
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from springtune.registry import import_name
 from springtune.safe_io.files import write_json, write_text
 
-from ..config.kind import kinds, outputs
+from ..config.kind import StudyKind, kinds, outputs
+from ..config.model import Study
 from ..output import dataset, summing_up
 from ..runs import job, provenance, rerun
 from ..runs.plan import plan, rows
 from ..runs.store import DamagedError
 from . import load_study
 
-if TYPE_CHECKING:
-    from ..config.kind import StudyKind
-    from ..config.model import Study
 
-
-def run(study: "Study", folder: Path, output: Path) -> None:
+def run(study: Study, folder: Path, output: Path) -> None:
     """Write the dataset and the summary of a study from its stored results."""
     try:
         groups = groups_of_study(study, folder)
@@ -44,22 +40,22 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     write_json(record, {"digest": digest})
 
 
-def group_of(kind: "StudyKind") -> dataset.Group:
+def group_of(kind: StudyKind) -> dataset.Group:
     """Group that a kind without a module ``collect`` declares."""
     return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions, kind.flags)
 
 
-def _groups_of_tasks(kind: "StudyKind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+def _groups_of_tasks(kind: StudyKind, study: Study, folder: Path) -> dict[str, xr.Dataset]:
     """Group of such a kind, from the stored rows of its stages."""
     group, found = group_of(kind), [row for stage in kind.stages for row in rows(stage, study, folder)]
     names = {name for row in found for name in row} if kind.sparse else None
     return {group.name: group.of_rows(study.axes, found, names).assign_attrs(kind.attributes(study.parts[kind.name]))}
 
 
-def groups_of_study(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+def groups_of_study(study: Study, folder: Path) -> dict[str, xr.Dataset]:
     """Groups of the dataset of a study by name."""
     groups: dict[str, xr.Dataset] = {}
-    for kind in (kind for kind in kinds() if study.parts[kind.name]):
+    for kind in filter(lambda kind: study.parts[kind.name], kinds()):
         if kind.variables:
             groups |= _groups_of_tasks(kind, study, folder)
         else:

@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind, declared_variables
+from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
@@ -151,12 +151,7 @@ KIND = StudyKind(
     axes=_axes,
     summary=lambda part: [["benchmark", len(part), "cases, timed one by one"]],
     variables=declared_variables(__file__),
-    dimensions={
-        "scene": "scene of the benchmark",
-        "approach": "definition / mesh type, or another approach",
-        "thread_count": "number of threads of explicit steps",
-        "precision": "floating-point numbers of explicit steps",
-    },
+    dimensions=declared_dimensions(__file__),
     stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
     outputs=OUTPUTS,
     tables=lambda study: ["benchmark", "explicit_steps"] if study.parts["benchmark"] else [],

@@ -101,7 +101,7 @@ def swept(group: Group, study: "Study") -> Group:
             further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
         elif "load" in dimensions and not name.startswith(PRINTED_PREFIX):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
-    found = group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
+    found = group.over(further, without={"force"} & {*study.swept} if group is ROOT else ())
     if group in (ROOT, FINITE_STRAIN, BLOCK) and study.plane_strain:
         row = ("material",), "1", "plane of the material, 'stress' or 'strain'; its constants are those in 3-D", ""
         found = replace(found, variables=found.variables | {"material_plane": row})
@@ -147,7 +147,7 @@ def _fields_of_rows(group, axes, rows):
     """Group of whole fields; its dimensions are as long as the longest arrays."""
 
     def longest(name, axis=0, least=1):
-        return tuple(range(max((row[name].shape[axis] for row in rows if name in row), default=least) or 1))
+        return range(max((row[name].shape[axis] for row in rows if name in row), default=least) or 1)
 
     axes = axes | {"particle": longest("x"), "spring": longest("spring_nodes"), "spring_end": (0, 1)}
     axes |= {"cell": longest("cell_nodes"), "cell_corner": longest("cell_nodes", 1, least=3)}
@@ -178,8 +178,8 @@ def _network_row(arrays):
 
 def _outline_row(points, moved):
     """Values of the outline of a reference: positions at rest and displacements."""
-    values = {"outline_x": points[:, 0], "outline_y": points[:, 1]}
-    return values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}
+    names = "outline_x", "outline_y", "reference_displacement_x", "reference_displacement_y"
+    return dict(zip(names, (*points.T, *moved.T)))
 
 
 # -- beams -------------------------------------------------------------------------------------------------------------
@@ -220,8 +220,7 @@ def _beam_groups(study, folder):
 def _body_rows(study):
     """Rows of materials and beams."""
     for one in {scene.material for scene in study.scenes}:
-        own = {"young_modulus": one.young_modulus, "poisson_ratio": one.poisson_ratio}
-        own["density"] = np.nan if one.density is None else one.density
+        own = {name: getattr(one, name) for name in ("young_modulus", "poisson_ratio", "density")}
         yield {"material": one.name} | own | {f"material_{name}": value for name, value in own.items()}
     for one in {scene.mesh.beam for scene in study.scenes}:
         extents = {f"beam_{name}": getattr(one, name) for name in ("length", "height", "thickness")}
@@ -248,20 +247,14 @@ def _comment(data, answers):
 def _reference_rows(study, answers):
     """Rows of references."""
     for one, result in answers.items():
-        labels = study.labels(one)
+        labels, message = study.labels(one), objection(result, one.force, "nonlinear")
         for kinematics in study.axes["kinematics"]:
             applies = not objection(result, one.force, kinematics)
             yield labels | {"kinematics": kinematics, "reference_applies": applies}
-        row = {"force": one.force, "reference_seconds": result["seconds"]} | labels
-        row["reference_message"] = objection(result, one.force, "nonlinear")
-        if "displacement" in result:
-            row |= {
-                "reference_displacement": one.force * result["displacement"],
-                "reference_error_estimate": result["error_estimate"],
-                "reference_rotation": abs(one.force) * result["rotation"],
-                "reference_strain": abs(one.force) * result["strain"],
-            }
-        yield row
+        size = abs(one.force)
+        scales = {"displacement": one.force, "error_estimate": 1.0, "rotation": size, "strain": size, "seconds": 1.0}
+        values = {f"reference_{name}": scale * result[name] for name, scale in scales.items() if name in result}
+        yield labels | values | {"force": one.force, "reference_message": message}
 
 
 def _reference(study, folder, one, fields=()):
@@ -280,8 +273,7 @@ def _scene_rows(study, folder, answers):
     calibration = stored.read_calibration(folder)
     cells, faces, fields = [], [], []
     for mesh, tasks in bodies.scene_tasks(study).items():
-        keys = [stored_key(task, calibration) for task in tasks]
-        path = folder / "solutions" / f"{bodies.stem(mesh)}.h5"
+        keys, path = [stored_key(task, calibration) for task in tasks], folder / "solutions" / f"{bodies.stem(mesh)}.h5"
         results = store.read(path, set(keys), ["face_profile"] if pressed(study) else [])
         kept = {fields_key(key) for task, key in zip(tasks, keys) if keeps_fields(study) and "keep_fields" in task}
         arrays = store.read(path, kept, [*FIELD_ARRAYS]) if kept else {}
@@ -300,10 +292,10 @@ def _scene_rows(study, folder, answers):
 
 def _printed_rows(study):
     """Rows of the paper's printed cells that the study has."""
+    own = [name for name in ROOT.variables if name.startswith(PRINTED_PREFIX)]
     for cell in study.printed:
         labels = {name: getattr(cell, name) for name in CELL}
         if all(label in study.axes[name] for name, label in labels.items()):
-            own = (name for name in ROOT.variables if name.startswith(PRINTED_PREFIX))
             yield labels | {name: getattr(cell, name.removeprefix(PRINTED_PREFIX)) for name in own}
 
 
@@ -315,8 +307,7 @@ def _curve_rows(study, folder, answers):
         results = store.read(path, [task["key"] for task in tasks], ["displacement", "stable"])
         for curve, task in zip(curves, tasks):
             result, reference = results[task["key"]], Reference(mesh.beam, curve.material, curve.load, curve.force)
-            displacement = result["displacement"]
-            wanted = curve.force * answers[reference].get("displacement", np.nan)
+            displacement, wanted = result["displacement"], curve.force * answers[reference].get("displacement", np.nan)
             status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
             row = {name: result[name] for name in ("displacement", "message", "best_stiffness")} | study.labels(curve)
             row |= {f"best_stiffness_{name}": result[f"best_{name}"] for name in ("status", "message")}
@@ -338,8 +329,8 @@ def _small_strain_name(study):
 def _finite_reference_rows(study, folder):
     """Rows of references at finite strain."""
     for one, kind in product(study.references, study.further_references):
-        result, known = _finite_reference(folder, one, kind), ("message", "displacement", "error_estimate")
-        values = {f"reference_{name}": result[name] for name in known if name in result}
+        result = _finite_reference(folder, one, kind)
+        values = {f"reference_{name}": result.get(name) for name in ("message", "displacement", "error_estimate")}
         yield study.labels(one) | {"reference": kind} | values
 
 
@@ -383,18 +374,15 @@ def _rest_rows(study, folder):
     shown = [scene for scene in study.scenes if scene in bodies.shown_scenes(study)]
     meshes = {mesh: stored.read(folder / "meshes", bodies.stem(mesh)) for mesh in dict.fromkeys(s.mesh for s in shown)}
     yield from (mesh.labels | _mesh_row(found.mesh) for mesh, found in meshes.items() if found)
-    outlined = set()  # scenes differ in their meshes and definitions
+    references = {}  # scenes differ in their meshes and definitions
     for scene in shown:
         labels = study.labels(scene)
         yield labels | {f"{SHOWN_PREFIX}{name}": labels[name] for name in study.swept}
-        one = Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
-        if one in outlined:
-            continue
-        outlined.add(one)
+        references.setdefault(Reference(scene.mesh.beam, scene.material, scene.load, scene.force), labels)
+    for one, labels in references.items():
         result = _reference(study, folder, one, ["x", "y", "displacements"])
-        if "x" not in result:
-            continue
-        yield labels | _outline_row(*outline(result["x"], result["y"], one.force * result["displacements"]))
+        if "x" in result:
+            yield labels | _outline_row(*outline(result["x"], result["y"], one.force * result["displacements"]))
 
 
 # -- shapes ------------------------------------------------------------------------------------------------------------
@@ -519,9 +507,8 @@ def _error(value, reference):
 
 def _shape_fields(study, folder):
     """Group of the drawn networks."""
-    drawn, cases = bodies.drawn_scenes(study), {}
-    for one in (one for one in study.shapes.scenes if one in drawn):
-        cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
+    drawn = [one for one in study.shapes.scenes if one in bodies.drawn_scenes(study)]
+    cases = bodies.group_by(drawn, lambda one: f"{one.shape}, {one.load}")
     rows = [{"case": case} | row for case, scenes in cases.items() for row in _case_rows(study, folder, scenes)]
     return _fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)
 
@@ -533,9 +520,8 @@ def _case_rows(study, folder, scenes):
     yield about | {"case_mesh_size": one.mesh_size}
     body = one.shape, one.material, one.load
     if body in study.shapes.referred:
-        found = _shape_reference(
-            study, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths")
-        )
+        arrays = "outline_points", "outline_displacements", "outline_lengths"
+        found = _shape_reference(study, folder, *body, arrays=arrays)
         if not found["message"]:
             sizes = found["outline_lengths"]
             rounds = {"outline_round": np.repeat(np.arange(len(sizes)), sizes)}

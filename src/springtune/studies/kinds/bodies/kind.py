@@ -42,16 +42,12 @@ def particles(area, mesh_size):
     return area / (0.866 * mesh_size**2)
 
 
-SEARCHED_DEFINITIONS = {"adjoint", "annealed", "evolved", "best-springs"}
-"""Definitions with a search, which takes about fifty times as long as the scene."""
-
-
 def expected_seconds(particles, definition=""):
-    """Expected seconds of a scene, a curve or a mesh."""
-    return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHED_DEFINITIONS else 1)
+    """Expected seconds of a scene, a curve or a mesh; a definition that searches takes fifty times as long."""
+    return (1e-3 + 1e-5 * particles) * (50 if definition and DEFINITIONS[definition].cost == 2 else 1)
 
 
-def _group_by(items, key):
+def group_by(items, key):
     """Items grouped by a key, in order."""
     groups = defaultdict(list)
     for item in items:
@@ -62,19 +58,19 @@ def _group_by(items, key):
 @cache_by_study
 def scenes_by_mesh(study):
     """Scenes of a study by their mesh."""
-    return _group_by(study.scenes, attrgetter("mesh"))
+    return group_by(study.scenes, attrgetter("mesh"))
 
 
 @cache_by_study
 def curves_by_mesh(study):
     """Sensitivity curves of a study by their mesh."""
-    return _group_by(study.curves, attrgetter("mesh"))
+    return group_by(study.curves, attrgetter("mesh"))
 
 
 @cache_by_study
 def shape_scenes_by_mesh(study):
     """Scenes of shapes by the stem of their mesh."""
-    return _group_by(study.shapes.scenes if study.shapes else (), shape_stem)
+    return group_by(study.shapes.scenes if study.shapes else (), shape_stem)
 
 
 # -- references that are interpolated ----------------------------------------------------------------------------------
@@ -176,14 +172,11 @@ def stem(mesh):
 
 
 @lru_cache(maxsize=1024)
-def reference_of(study, beam, material, load):
+def reference_of(study, *body):
     """Argument of `any_reference.read` for the reference of a beam, material and load."""
-    solved = solved_reference(beam, material, load)
-    name = LOADS[load].kind.name
+    solved, name = solved_reference(*body), LOADS[body[-1]].kind.name
     box, problems = interpolants(study).get(name, (None, {}))
-    if (beam, material, load) not in problems:
-        return solved
-    return solved | {"interpolant": interpolant_key(name, box), "problem": problems[beam, material, load]}
+    return solved | ({"interpolant": interpolant_key(name, box), "problem": problems[body]} if body in problems else {})
 
 
 REFERENCES_OF_SHAPES = (
@@ -214,10 +207,9 @@ def interpolant_key(kind, box):
 @cache
 def solved_reference(beam, material, load):
     """Key of the unit problem of a reference, and its scales."""
-    length, displacement = unit_scales(beam, material, LOADS[load].kind)
     code = _reference_code("reference.finite_strain", "reference.interpolant")
-    key = hash_of(unit_problem_of(beam, material, load), code)
-    return {"key": key, "length": length, "displacement": displacement}
+    key, scales = hash_of(unit_problem_of(beam, material, load), code), unit_scales(beam, material, LOADS[load].kind)
+    return {"key": key} | dict(zip(("length", "displacement"), scales))
 
 
 def finite_key(reference, kind):
@@ -233,8 +225,7 @@ def unit_problem_of(beam, material, load):
 
 def finite_problem(reference, kind):
     """Task of a reference at finite strain."""
-    law, _, plane = kind.partition("-plane-")
-    load = LOADS[reference.load]
+    (law, _, plane), load = kind.partition("-plane-"), LOADS[reference.load]
     found = {"law": law, "plane": plane, "load": load.kind.name, "force": reference.force, "follower": load.follower}
     return found | {"beam": beam_key(reference.beam), "material": material_key(reference.material)}
 
@@ -252,18 +243,15 @@ def _scene_tasks(study, mesh, scenes):
         if place not in shared:
             shared[place] = _network_task(study, mesh, *place)
         task, key = shared[place]
-        own = {"force": scene.force}
+        own, further = {"force": scene.force}, {"keep_fields": True} if scene in kept else {}
         if scene.definition == "paper":
             own["stiffness"] = study.stiffness_table[mesh.mesh_type, scene.material.name]
         if scene.stiffness_scale != 1:
             own["stiffness_scale"] = scene.stiffness_scale
-        further = {}
         if scene.definition == "calibrated":  # stiffness is proportional to thickness
             group = calibration_name(scene)
             further["calibration"] = calibrations(study)[group].key
             own["thickness_ratio"] = mesh.beam.thickness / calibrating(study)[group][0].mesh.beam.thickness
-        if scene in kept:
-            further["keep_fields"] = True
         # As a text: JSON of 100,000 scenes takes a third of a second.
         yield {**task, **own, **further, "key": hash_of_text(f"{key} {own}")}
 
@@ -308,7 +296,7 @@ def shown_scenes(study):
 def calibrating(study):
     """Curves that calibrate each group of scenes."""
     chosen = (one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration)
-    return _group_by(chosen, calibration_name)
+    return group_by(chosen, calibration_name)
 
 
 def calibration_name(scene):
@@ -319,14 +307,12 @@ def calibration_name(scene):
 @cache_by_study
 def calibrations(study):
     """Tasks of the calibrated stiffnesses by group, all in one job and file."""
-
-    def member(curve):
-        place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
-        return place | {"load": curve.load, "force": curve.force}
-
     code, found = stage_key("studies.kinds.bodies.calibrate"), {}
     for name in sorted({calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}):
-        members = [member(one) for one in calibrating(study)[name]]
+        members = [
+            {"mesh": stem(one.mesh), "curve": curve_task(study, one)["key"], "load": one.load, "force": one.force}
+            for one in calibrating(study)[name]
+        ]
         found[name] = Task({"members": members}, name="all", file=CALIBRATION_STEM, key=hash_of(members, code))
     return found
 
@@ -356,13 +342,12 @@ def shape_particles(study, one):
 @cache_by_study
 def drawn_scenes(study):
     """Scenes with drawn networks: of each shape and load the finest mesh that is not too large, and one material."""
-    found = set()
-    for scenes in _group_by(study.shapes.scenes, attrgetter("shape", "load")).values():
+    found, size, ways = set(), attrgetter("mesh_size"), attrgetter("material", "kinematics")
+    for scenes in group_by(study.shapes.scenes, attrgetter("shape", "load")).values():
         few = [one for one in scenes if shape_particles(study, one) <= MOST_PARTICLES_DRAWN]
-        size = attrgetter("mesh_size")
-        mesh = min(few, key=size) if few else max(scenes, key=size)
-        alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
-        found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
+        mesh = mesh_name(min(few, key=size) if few else max(scenes, key=size))
+        alike = [one for one in scenes if mesh_name(one) == mesh]
+        found |= {one for one in alike if ways(one) == ways(alike[0])}
     return found
 
 
@@ -402,10 +387,10 @@ def _case_values(study, shape, material, name):
     """Thickness, load and materials of a scene; with densities only under gravity."""
     from .task_values import load
 
-    case, materials = study.shape(shape).loads[name], study.materials_of(shape, material)
-    weighs = any(case.gravity)
-    materials = {part: material_key(one, weighs) for part, one in materials.items()}
-    return {"thickness": study.shape(shape).thickness, "load": load(case), "materials": materials}
+    body = study.shape(shape)
+    case, materials = body.loads[name], study.materials_of(shape, material)
+    materials = {part: material_key(one, any(case.gravity)) for part, one in materials.items()}
+    return {"thickness": body.thickness, "load": load(case), "materials": materials}
 
 
 def shape_reference_task(study, shape, material, name, law=""):
@@ -421,9 +406,9 @@ def shape_scene_task(study, one):
     """Task of a scene of a shape."""
     code = stage_key("studies.kinds.bodies.solve", without=WITHOUT_FINITE_STRAIN), definition_key(one.definition)
     task = _case_values(study, one.shape, one.material, one.load)
-    task = task | {"definition": one.definition, "kinematics": one.kinematics}
-    key = hash_of(shape_mesh_keys(study)[shape_stem(one)], task, code)
+    task = {**task, "definition": one.definition, "kinematics": one.kinematics}
     kept = SHAPES_OUTPUT in study.outputs and one in drawn_scenes(study)
+    key = hash_of(shape_mesh_keys(study)[shape_stem(one)], task, code)
     return {"key": key} | task | ({"keep_fields": True} if kept else {})
 
 
@@ -452,19 +437,16 @@ def _reference_tasks(study):
     found = {}
     for one in study.references:
         body = one.beam, one.material, one.load
-        if "interpolant" not in reference_of(study, *body):
-            problem, key = unit_problem_of(*body), solved_reference(*body)["key"]
-            name = hash_of(problem[0], problem[2])
-            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
+        if "interpolant" not in (solved := reference_of(study, *body)):
+            problem, key = unit_problem_of(*body), solved["key"]
+            found[key] = Task({"problem": problem}, seconds=3e-2, name=hash_of(problem[0], problem[2]), key=key)
         for kind in study.further_references:
             values, key = finite_problem(one, kind), finite_key(one, kind)
             found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
     yield from found.values()
     for kind, (box, problems) in interpolants(study).items():
-        key = interpolant_key(kind, box)
-        keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-        values = {"kind": kind, "box": box, "problems": keys}
-        yield Task(values, seconds=10.0, name=key, key=key)
+        key, keys = interpolant_key(kind, box), {solved_reference(*one)["key"]: unit for one, unit in problems.items()}
+        yield Task({"kind": kind, "box": box, "problems": keys}, seconds=10.0, name=key, key=key)
     for one in (*study.shapes.referred, *study.shapes.finite) if study.shapes else ():
         task = shape_reference_task(study, *one)
         yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
@@ -474,10 +456,6 @@ def _curve_tasks(study):
     for mesh, curves in curves_by_mesh(study).items():
         for task in (curve_task(study, one) for one in curves):
             yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
-
-
-def _calibration_tasks(study):
-    return calibrations(study).values()
 
 
 def _solve_tasks(study):
@@ -495,7 +473,7 @@ STAGES = (
     Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
     Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
     Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh"),
-    Stage("calibrate", "studies.kinds.bodies.calibrate", _calibration_tasks, "curves"),
+    Stage("calibrate", "studies.kinds.bodies.calibrate", lambda study: calibrations(study).values(), "curves"),
     Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh"),
 )
 
@@ -514,8 +492,7 @@ def _expand(config, declared):
 
 
 def _axes(found):
-    shapes = found["shapes"]
-    if not shapes:
+    if not (shapes := found["shapes"]):
         return {}
     scenes = shapes.scenes
     labels = {name: tuple(dict.fromkeys(getattr(one, name) for one in scenes)) for name in vars(scenes[0])}
@@ -538,8 +515,7 @@ def _extents(shape, file):
 
 
 def _summary(found):
-    shapes = found["shapes"]
-    if not shapes:
+    if not (shapes := found["shapes"]):
         return []
     cases = {(one.shape, one.load) for one in shapes.scenes}
     quantities = sum(len(shapes.shape[shape].loads[load].quantities) for shape, load in cases)
@@ -586,10 +562,12 @@ def summary(study: Study, further: list[list[object]]) -> str:
     each = (len(study.scenes) + len(study.curves)) / meshes
     requested = sum(len(grid.scenes) for grid in study.grids)
     repeated = requested - len(study.scenes)
-    again = f"{repeated} of {requested} are in more than one grid" if repeated else ""
-    scaled = "small strain scales with force, E t and size"
+    again, scaled = (
+        f"{repeated} of {requested} are in more than one grid",
+        "small strain scales with force, E t and size",
+    )
     rows: list[list[object]] = [
-        ["scenes", len(study.scenes), again],
+        ["scenes", len(study.scenes), again if repeated else ""],
         ["meshes", meshes, f"each serves {each:.3g} scenes and curves on average"],
         ["references", len(study.references), f"from {_count_solutions(study)}: {scaled}"],
         ["curves", len(study.curves), f"{len(study.stiffness_ratios)} stiffnesses each, along one solution path"],
@@ -607,10 +585,8 @@ def _count_solutions(study: Study) -> str:
         for one in study.references
         if "interpolant" not in reference_of(study, one.beam, one.material, one.load)
     }
-    alone, interpolated = len(problems), len(interpolants(study))
-    words = [f"{alone} solution{'s' * (alone != 1)}"] if alone or not interpolated else []
-    words += [f"{interpolated} interpolant{'s' * (interpolated != 1)}"] if interpolated else []
-    return " and ".join(words)
+    counts = {"solution": len(problems), "interpolant": len(interpolants(study))}
+    return " and ".join(f"{n} {what}{'s' * (n != 1)}" for what, n in counts.items() if n) or "0 solutions"
 
 
 def _grid_rows(study: Study) -> list[list[object]]:
@@ -620,7 +596,7 @@ def _grid_rows(study: Study) -> list[list[object]]:
     for grid in study.grids:
         scenes = set(grid.scenes)
         references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
-        meshes = {scene.mesh for scene in scenes}
-        rows.append([grid.name, len(scenes), len(scenes - seen), len(meshes), len(references), len(grid.curves)])
+        counted = scenes, scenes - seen, {scene.mesh for scene in scenes}, references, grid.curves
+        rows.append([grid.name, *map(len, counted)])
         seen |= scenes
     return rows

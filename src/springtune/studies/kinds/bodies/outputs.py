@@ -1,16 +1,15 @@
 """Outputs of beams and shapes, and their views on the page to browse."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections import Counter
+from collections.abc import Callable, Mapping
+from operator import itemgetter
+from typing import Any
 
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
 from ...config.kind import stem as figure_stem
-from ...config.model import cache_by_study
-
-if TYPE_CHECKING:
-    from ...config.model import Study
+from ...config.model import Study, cache_by_study
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 """Dimensions with one label in a figure of sensitivity curves."""
@@ -39,7 +38,7 @@ def stem(selection: Mapping[str, str], number: int | None = None) -> str:
 
 
 @cache_by_study
-def stems(study: "Study") -> list[str]:
+def stems(study: Study) -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
@@ -51,24 +50,22 @@ def stems(study: "Study") -> list[str]:
 
 
 @cache_by_study
-def pressed(study: "Study") -> bool:
+def pressed(study: Study) -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)
 
 
-def _lack_of_pressure(study: "Study") -> str:
+def _lack_of_pressure(study: Study) -> str:
     return "" if pressed(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
 
 
-def _sweeps(study: "Study") -> dict[str, Mapping[str, object]]:
+def _sweeps(study: Study) -> dict[str, Mapping[str, object]]:
     """Selections of the figures of swept parameters with several values, by stem."""
     found: dict[str, Mapping[str, object]] = {}
     for name in study.swept:
-        values: dict[tuple[object, ...], set[object]] = {}
-        for labels in map(study.labels, study.scenes):
-            place = tuple(labels[one] for one in (*SCENE_LABELS, "kinematics", "beam"))
-            values.setdefault(place, set()).add(labels[name])
-        several = [dict(zip(SCENE_LABELS, place)) for place, members in values.items() if len(members) > 1]
+        place = itemgetter(*SCENE_LABELS, "kinematics", "beam", name)
+        counts = Counter(values[:-1] for values in dict.fromkeys(map(place, map(study.labels, study.scenes))))
+        several = [dict(zip(SCENE_LABELS, values)) for values, count in counts.items() if count > 1]
         found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
     return found
 
@@ -87,9 +84,6 @@ MESH_OF_FILE = "file"
 SHAPES_OUTPUT = "shapes"
 """Output that needs whole networks."""
 
-OVERVIEW_STEM = "shapes_overview"
-"""Stem of the figure of all quantities."""
-
 ERRORS_STEM, DEFORMED_STEM = "shapes_errors", "shapes_deformed"
 """Begins of the stems of the figures of a shape under a load."""
 
@@ -99,17 +93,20 @@ def mesh_name(one: Any) -> str:
     return f"{one.shape}_{one.mesh_type}" + (f"_{1e3 * one.mesh_size:.9g}mm" if one.mesh_size else "")
 
 
-def shape_figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
+def shape_figures(cases: list[dict[str, str]]) -> dict[str, dict[str, str]]:
     """Selections by stem: of all quantities, and of the errors and networks of each shape and load."""
-    found: dict[str, dict[str, str]] = {OVERVIEW_STEM: {}} if cases else {}
-    for name in (ERRORS_STEM, DEFORMED_STEM):
-        found |= {figure_stem(name, one): one for one in cases}
-    return found
+    found: dict[str, dict[str, str]] = {"shapes_overview": {}} if cases else {}
+    return found | {figure_stem(name, one): one for name in (ERRORS_STEM, DEFORMED_STEM) for one in cases}
 
 
-def _shape_cases(study: "Study") -> "list[dict[str, str]]":
+def _figures_of_shapes(study: Study) -> dict[str, dict[str, str]]:
     pairs = dict.fromkeys((one.shape, one.load) for one in study.shapes.scenes) if study.shapes else ()
-    return [{"shape": shape, "load": load} for shape, load in pairs]
+    return shape_figures([{"shape": shape, "load": load} for shape, load in pairs])
+
+
+def _of_scenes(name: str) -> Callable[[Study], dict[str, dict[str, str]]]:
+    """Figures of the scenes of each mesh type, material and load."""
+    return lambda study: distinct(name, SCENE_LABELS, map(study.labels, study.scenes))
 
 
 OUTPUTS = (
@@ -121,18 +118,11 @@ OUTPUTS = (
         job="sensitivity",
         usual=True,
     ),
-    Output(
-        "size",
-        "errors against mesh size",
-        figures=lambda study: distinct("size", SCENE_LABELS, map(study.labels, study.scenes)),
-        plot=f"{PLOTS}:size",
-        job="scenes",
-        usual=True,
-    ),
+    Output("size", "errors against mesh size", _of_scenes("size"), plot=f"{PLOTS}:size", job="scenes", usual=True),
     Output(
         "deformed",
         "deformed networks, and the group `/fields`",
-        figures=lambda study: distinct("deformed", SCENE_LABELS, map(study.labels, study.scenes)),
+        figures=_of_scenes("deformed"),
         plot=f"{PLOTS}:deformed",
         job="scenes",
         usual=True,
@@ -157,7 +147,7 @@ OUTPUTS = (
     Output(
         "block",
         "a pressed face",
-        figures=lambda study: {"block": {}},
+        lambda study: {"block": {}},
         plot=f"{PLOTS}:block",
         job="scenes",
         lack=_lack_of_pressure,
@@ -165,7 +155,7 @@ OUTPUTS = (
     Output(
         SHAPES_OUTPUT,
         "errors and deformed networks of shapes, and the group `/shape_fields`",
-        figures=lambda study: shape_figures(_shape_cases(study)),
+        figures=_figures_of_shapes,
         plot="studies.kinds.bodies.shape_figures:shapes",
         job="shapes",
         usual=True,

@@ -48,16 +48,11 @@ NETWORK_COLUMNS = {
     "printed_reference_mm": ("paper_reference_displacement", 1e3),
     "printed_displacement_mm": ("paper_displacement", 1e3),
     "printed_error_percent": ("paper_deformation_error", 100),
-    "stiffness_N_per_m": ("stiffness", 1),
-    "stiffness_inside_N_per_m": ("stiffness_inside", 1),
-    "stiffness_outline_N_per_m": ("stiffness_outline", 1),
+    **{f"{name}_N_per_m": (name, 1) for name in ("stiffness", "stiffness_inside", "stiffness_outline")},
     "network_mm": ("displacement", 1e3),
     "reference_mm": ("reference_displacement", 1e3),
     "error_percent": ("deformation_error", 100),
-    "reference_applies": ("reference_applies", 1),
-    "status": ("status", 1),
-    "message": ("message", 1),
-    "reference_message": ("reference_message", 1),
+    **{name: (name, 1) for name in ("reference_applies", "status", "message", "reference_message")},
     "remark": ("paper_remark", 1),
 }
 """Columns of a network: variable and factor."""

@@ -4,7 +4,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from ...config.kind import declared_variables
+from ...config.kind import declared_dimensions, declared_variables
 from ...output.dataset import Group
 from ...runs.plan import results
 from . import RUN_ENDS, SETTING
@@ -17,15 +17,7 @@ SCENE_PARTS = ("beam", "mesh_type", "mesh_size", "material", "load", "force")
 RUN_COORDINATES = (*(f"scene_{part}" for part in SCENE_PARTS), "program")
 """Variables that describe scenes and engines."""
 
-ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
-    "scene": "scene in engines",
-    "engine": "program and solver",
-    "precision": "floating-point numbers",
-    "dt": ("time of a frame", "s"),
-    "substeps": "steps of a frame",
-    "iterations": "iterations of the solver in a step",
-    FACTOR: "factor on all stiffnesses that are typed",
-}
+ENGINE_DIMENSIONS = declared_dimensions(__file__)
 """Dimensions of these groups."""
 
 FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}

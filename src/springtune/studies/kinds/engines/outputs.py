@@ -19,15 +19,11 @@ OUTPUTS = (
 )
 
 
-ENGINE_COLUMNS = {
-    "dt_ms": ("dt", 1e3),
-    "displacement_mm": ("displacement", 1e3),
-    "reference_mm": ("reference_displacement", 1e3),
-    "error_percent": ("error", 100),
-    "definition_error_percent": ("definition_error", 100),
-    "solver_error_percent": ("solver_error", 100),
-    "frame_ms": ("frame_seconds", 1e3),
-}
+ENGINE_COLUMNS = (
+    {"dt_ms": ("dt", 1e3), "displacement_mm": ("displacement", 1e3), "reference_mm": ("reference_displacement", 1e3)}
+    | {f"{name}_percent": (name, 100) for name in ("error", "definition_error", "solver_error")}
+    | {"frame_ms": ("frame_seconds", 1e3)}
+)
 """Columns of the table: variable and factor."""
 
 

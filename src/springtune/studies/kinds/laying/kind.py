@@ -12,7 +12,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind, declared_variables
+from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from .outputs import OUTPUTS
@@ -133,7 +133,7 @@ KIND = StudyKind(
     axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in NETWORK},
     summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
     variables=declared_variables(__file__),
-    dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
+    dimensions=declared_dimensions(__file__),
     stages=(Stage("laying", "studies.kinds.laying.solve", _tasks),),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],

@@ -12,18 +12,10 @@ OUTPUTS = (
     ),
 )
 
-REFERENCE_LINES = (("reference_x", "reference_y", "finite elements"), ("trapezoid_x", "trapezoid_y", "trapezoid"))
-
-
-LAYING_COLUMNS = {
-    "mesh_size_mm": ("mesh_size", 1e3),
-    "area_mm2": ("area_under_strip", 1e6),
-    "area_error_percent": ("area_error", 100),
-    "elongation_percent": ("elongation", 100),
-    "reference_elongation_percent": ("reference_elongation", 100),
-    "reference_elongation_known_to_points": ("reference_elongation_error_estimate", 100),
-    "penetration_per_mesh_size": ("penetration", 1),
-}
+LAYING_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "area_mm2": ("area_under_strip", 1e6)}
+LAYING_COLUMNS |= {f"{name}_percent": (name, 100) for name in ("area_error", "elongation", "reference_elongation")}
+LAYING_COLUMNS |= {"reference_elongation_known_to_points": ("reference_elongation_error_estimate", 100)}
+LAYING_COLUMNS |= {"penetration_per_mesh_size": ("penetration", 1)}
 """Columns of the table: variable and factor."""
 
 

@@ -10,7 +10,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.kind import Stage, StudyKind, declared_variables
+from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
@@ -36,8 +36,7 @@ PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
 
 def _check(config, problems):
     for name, grid in config.grids.items():
-        made = grid.moduli and any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type)
-        if made:
+        if grid.moduli and not MESH_TYPES.keys().isdisjoint(grid.mesh_type):
             box = config.patch.length, config.patch.height
             check_particles(problems, ("grids", name, "mesh_size"), grid.mesh_size, *box)
 
@@ -51,10 +50,8 @@ def _expand(config, declared):
             own = (declared.materials[name].in_plane.poisson_ratio for name in grid.material)
             ratios = dict.fromkeys(grid.poisson_ratio or own)
             found |= dict.fromkeys(product(derived, grid.mesh_type, grid.mesh_size, ratios))
-    if not found:
-        return None
-    box = Beam(config.patch.length, config.patch.height, min(config.patch.length, config.patch.height), "patch")
-    return box, [dict(zip(PATCH, labels)) for labels in sorted(found)]
+    sides = config.patch.length, config.patch.height
+    return (Beam(*sides, min(sides), "patch"), [dict(zip(PATCH, one)) for one in sorted(found)]) if found else None
 
 
 def _axes(moduli):
@@ -62,9 +59,8 @@ def _axes(moduli):
 
 
 def _summary(moduli):
-    patches = {(labels["mesh_type"], labels["mesh_size"]) for labels in moduli[1]}
-    on = "1 patch" if len(patches) == 1 else f"{len(patches)} patches"
-    return [["moduli", len(moduli[1]), f"measured on {on}"]]
+    patches = len({(labels["mesh_type"], labels["mesh_size"]) for labels in moduli[1]})
+    return [["moduli", len(moduli[1]), f"measured on {patches} patch{'es' * (patches != 1)}"]]
 
 
 def _tasks(study):
@@ -87,34 +83,20 @@ def _patch_mesh(study, box, mesh_type, size):
 
 
 def _attributes(moduli):
-    box, _ = moduli
     comment = "of the mesh that a beam of this length and height [m] gets"
-    return {"comment": comment, "patch_length": box.length, "patch_height": box.height}
+    return {"comment": comment, "patch_length": moduli[0].length, "patch_height": moduli[0].height}
 
 
 KIND = StudyKind(
     "moduli",
-    study_fields={
-        "patch": (
-            PatchConfig,
-            Field(default_factory=PatchConfig, description="Box for effective moduli."),
-        )
-    },
-    grid_fields={
-        "moduli": (
-            Flag,
-            default(
-                "false",
-                description="Measure effective moduli on the box under `patch`.",
-            ),
-        )
-    },
+    study_fields={"patch": (PatchConfig, Field(default_factory=PatchConfig, description="Box for effective moduli."))},
+    grid_fields={"moduli": (Flag, default("false", description="Measure effective moduli on the box under `patch`."))},
     check=_check,
     expand=_expand,
     axes=_axes,
     summary=_summary,
     variables=declared_variables(__file__),
-    dimensions={"poisson_ratio": "Poisson's ratio that the definition is asked for"},
+    dimensions=declared_dimensions(__file__),
     attributes=_attributes,
     stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),
     outputs=OUTPUTS,

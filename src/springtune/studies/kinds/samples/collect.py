@@ -30,9 +30,6 @@ SAMPLES = Group(
     further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
 )
 
-INDEX = ("quantity", "parameter", "load", "definition")
-BASE = ("quantity", "load", "definition")
-
 ORDERS, ENDS = ("first", "total"), ("", "_low", "_high")
 """Orders of Sobol indices, and the ends of their bootstrap bands."""
 
@@ -47,11 +44,7 @@ def groups(study, folder):
     """Build the groups of a dataset."""
     sample = study.parts["samples"]
     drawn, results = _read_results(sample, folder / "samples")
-    axes = study.axes | {
-        "sample": tuple(range(sample.rows)),
-        "parameter": sample.varied,
-        "quantity": tuple(QUANTITIES),
-    }
+    axes = study.axes | {"sample": tuple(range(sample.rows)), "parameter": sample.varied, "quantity": tuple(QUANTITIES)}
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
     group, places = _coordinates(sample, drawn, study.axes)
@@ -59,8 +52,7 @@ def groups(study, folder):
     frames += chain.from_iterable(_load_rows(load, sample, drawn, results, folder / "samples") for load in sample.loads)
     data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
     data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type")}
-    data.attrs["kinematics"] = "linear"
-    data.attrs["varied"] = " ".join(sample.varied)
+    data.attrs |= {"kinematics": "linear", "varied": " ".join(sample.varied)}
     found = {SAMPLES.name: data}
     if sample.design == SOBOL_INDICES:
         found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(SOBOL_ATTRIBUTES)
@@ -109,8 +101,7 @@ def _load_rows(load, sample, drawn, results, folder):
         displacement = np.where(there, sign * found["displacement"], np.nan)
         values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
         values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
-        values["message"] = found["message"]
-        yield pd.DataFrame(rows | {"definition": name} | values)
+        yield pd.DataFrame(rows | {"definition": name, "message": found["message"]} | values)
 
 
 def _unit_references(sample, drawn, folder, kind, aspects):
@@ -141,9 +132,6 @@ def _coordinates(sample, drawn, dimensions):
         variables["role"] = ("sample",), "1", "part of the base sample: A, B, or A with one parameter of B", 0
         places["role"] = np.tile(range(len(parts)), sample.size)
     return replace(SAMPLES, variables=SAMPLES.variables | variables, flags={"role": tuple(parts)}), places
-
-
-FAILURES = "where a scene has no value the whole base sample is left out; base_samples_without counts them"
 
 
 def _quantities(sample, data):
@@ -182,7 +170,7 @@ NEGLIGIBLE_DEVIATION = 1e-12
 SOBOL_ATTRIBUTES = {
     "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
     "bands": f"between percentiles of {BOOTSTRAP_SAMPLES} bootstrap samples, {100 * BAND_LEVEL:g} %",
-    "failures": FAILURES,
+    "failures": "where a scene has no value the whole base sample is left out; base_samples_without counts them",
 }
 """Attributes of the group."""
 

@@ -34,8 +34,6 @@ OUTPUTS = (
     ),
 )
 
-ERROR_SELECTION = {"quantity": "deformation_error"}
-
 
 def tables(tree):
     """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
@@ -43,10 +41,8 @@ def tables(tree):
         return []
     found = tree["sobol"].to_dataset()
     labels = ["quantity", "load", "definition", "parameter"]
-    columns = [
-        *(f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")),
-        "base_samples",
-    ]
+    columns = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
+    columns.append("base_samples")
     frame = found[columns].to_dataframe(dim_order=labels).reset_index()[[*labels, *columns]]
     frame = frame[frame.base_samples > 0]
     frame["definition"] = frame["definition"].mask(frame["quantity"] == "best_stiffness", "")  # one of all definitions

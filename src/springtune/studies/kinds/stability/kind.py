@@ -10,7 +10,7 @@ from springtune.mesh.cells import MESH_TYPES
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_density, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind, declared_variables
+from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import AXES, DEFINITION_FREE, EXPERIMENTS
@@ -94,30 +94,6 @@ def _tasks(study):
         yield Task(values, also, {"experiment": name, "definition": definition}, seconds=3.0)
 
 
-EXPERIMENT_DIMENSIONS: dict[str, str | tuple[str, str]] = {
-    "integrator": "time integrator",
-    "damper": "damping in proportion to mass, or of dampers along springs",
-    "damping_ratio": "damping ratio of the highest mode",
-    "step_ratio": "time step over 2 / omega_max",
-    "map_damping_ratio": "damping ratio of the highest mode, damping in proportion to mass",
-    "sample": "number of the sample in time",
-    "critical_ratio": "damping over that critical for the lowest loaded mode",
-    "cg_iterations": "conjugate-gradient iterations a step of backward Euler; 0 is a direct solver",
-    "implicit_steps": "steps of backward Euler",
-    "sliver_angle": ("smallest angle of the drawn triangle", "degree"),
-    "stiffness_contrast": "stiffness of the stiff parts over that of the soft ones",
-    "stressed_poisson_ratio": "Poisson's ratio",
-    "scale": ("length of an edge of the scaled beam", "m"),
-    "precision": "floating-point numbers of an explicit run",
-    "strain_load": "axial load, or a follower pressure on a long face, its force taken for the strain",
-    "strain": "force over E t times the loaded side",
-    "perturbation": "largest move of an inner particle over the mesh size",
-    "rows": "triangles over the height of the column",
-    "arch_point": "point of the arch's path",
-    "experiment": "experiment on stability",
-}
-
-
 KIND = StudyKind(
     "stability",
     study_fields={"stability": optional(StabilityConfig, "Experiments on numerical stability: group `/stability`.")},
@@ -126,7 +102,7 @@ KIND = StudyKind(
     axes=_axes,
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
     variables=declared_variables(__file__),
-    dimensions=EXPERIMENT_DIMENSIONS,
+    dimensions=declared_dimensions(__file__),
     flags={"behaviour": BEHAVIOURS},
     sparse=True,
     stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
