@@ -10,9 +10,6 @@ from springtune.problem.quantities import Status
 
 from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
 
-OWN_LAW_REFERENCES = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE)
-"""References of own laws, by priority; the last one of materials in plane strain alone."""
-
 Variables = Mapping[str, tuple[Sequence[str], np.ndarray]]
 """Dimensions and values of a group's variables and labels."""
 
@@ -38,28 +35,31 @@ def requested_cells(group: Variables, finite: Variables | None = None, error: st
     valid = cells[error]
     if "reference_applies" in cells:
         valid = np.where(cells["reference_applies"] == 1, valid, np.nan)
-    if finite and has_own_law(finite):
-        valid = np.where(cells["kinematics"] == "linear", valid, _own_law_errors(finite, places))
+    if finite and own_laws(finite):
+        own, law, known = own_law(finite)
+        places["reference"] = law[at := tuple(places[one] for one in own)]
+        own, values = finite["deformation_error"]
+        errors = np.where(known[at], values[tuple(places[one] for one in own)], np.nan)
+        valid = np.where(cells["kinematics"] == "linear", valid, errors)
     cells["valid_error"] = np.where(cells["status"] == Status.SOLVED, valid, np.nan)
     return cells
 
 
-def has_own_law(finite: Variables) -> bool:
-    """Whether a group of references at finite strain has one of a material's own law."""
-    return "reference" in finite and bool({*OWN_LAW_REFERENCES} & {*finite["reference"][1].tolist()})
+def own_laws(finite: Variables) -> list[str]:
+    """References of materials' own laws in a group of references, by priority; in plane strain only with planes."""
+    own = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, *((STRAINED_REFERENCE,) if "material_plane" in finite else ()))
+    return [law for law in own if law in finite["reference"][1]] if "reference" in finite else []
 
 
-def _own_law_errors(finite: Variables, places: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Errors of cells against the reference of their material's own law and plane."""
-    laws, found = finite["reference"][1].tolist(), np.array(np.nan)
-    for law in (one for one in reversed(OWN_LAW_REFERENCES) if one in laws):
-        at = {name: values[tuple(places.get(one, laws.index(law)) for one in own)]
-              for name, (own, values) in finite.items() if {*own} <= {*places, "reference"}}  # fmt: skip
-        known = np.isfinite(at["reference_displacement"])
-        if law == STRAINED_REFERENCE and "material_plane" in at:
-            known = known & (at["material_plane"] == "strain")
-        found = np.where(known, at["deformation_error"], found)
-    return found
+def own_law(finite: Variables) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Dimensions; along them the place of a material's own law among the references, and whether it has a number."""
+    dims, values = finite["reference_displacement"]
+    own, laws = [one for one in dims if one != "reference"], own_laws(finite)
+    numbers = [finite["reference"][1].tolist().index(law) for law in laws]
+    known = np.isfinite(np.moveaxis(values, [*dims].index("reference"), 0))[numbers]
+    if laws[-1] == STRAINED_REFERENCE:
+        known[-1] &= broadcast(own, *finite["material_plane"]) == "strain"
+    return own, np.select([*known], numbers, numbers[-1]), known.any(axis=0)
 
 
 class DefinitionErrors(NamedTuple):

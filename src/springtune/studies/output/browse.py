@@ -38,7 +38,7 @@ from .answers import (
     Variables,
     broadcast,
     definition_errors,
-    has_own_law,
+    own_laws,
     requested_cells,
     sign_of_displacements,
     what_to_type,
@@ -442,7 +442,7 @@ def overview(groups: Mapping[str, Variables]) -> Content:
         if {source.error, "status", "definition"} <= {*group}:
             finite = groups.get("/finite_strain", {}) if source.group == "/" else {}
             content = _errors(source, requested_cells(group, finite, source.error))
-            found.append(content | {"finite_strain": has_own_law(finite)})
+            found.append(content | {"finite_strain": bool(own_laws(finite))})
     return {
         "sources": found,
         "curves": _curves({**root, **curves}) if "deformation_error" in curves else {},

@@ -14,7 +14,7 @@ import xarray as xr
 
 from springtune.problem.quantities import nearest
 
-from .dataset import NOT_REQUESTED, flag_words, is_flagged
+from .dataset import NOT_REQUESTED, as_words, flag_words, is_flagged
 from .text import NUMBER, from_json, without_numbers
 
 RELATIVE_TOLERANCE = 1e-6
@@ -23,17 +23,8 @@ RELATIVE_TOLERANCE = 1e-6
 MEASURED_VARIABLES = ("seconds", "*_seconds", "seconds_*", "solver", "spring_updates")
 """Variables that depend on the machine."""
 
-HIDDEN_ATTRIBUTES = {
-    "created",
-    "history",
-    "config",
-    "config_sha256",
-    "software",
-    "inputs",
-    "source",
-    "Conventions",
-    "references",
-}
+HIDDEN_ATTRIBUTES = {"created", "history", "config", "config_sha256", "software", "inputs", "source", "Conventions",
+                     "references"}  # fmt: skip
 """Attributes that a comparison does not note."""
 
 Labels = dict[str, str | float]
@@ -71,7 +62,7 @@ class Change:
     def difference(self) -> float:
         """After minus before; NaN for texts and flags."""
         if isinstance(self.before, str) or isinstance(self.after, str):
-            return float("nan")
+            return math.nan
         return self.after - self.before
 
 
@@ -110,8 +101,8 @@ class GroupChanges:
     @property
     def different(self) -> bool:
         """Whether the group differs."""
-        changed = any(one.changed for one in (*self.flags, *self.values)) or any(one.count for one in self.cells)
-        return bool(changed or self.labels or any(self.variables) or self.unlike)
+        counts = [*(one.changed for one in (*self.flags, *self.values)), *(one.count for one in self.cells)]
+        return any([*counts, *self.variables, self.labels, self.unlike])
 
 
 @dataclass(frozen=True)
@@ -265,8 +256,10 @@ def _compare_variable(
     if not one.size:
         return VariableChanges(name, 0, 0, [])
     flagged = is_flagged(one) and is_flagged(other)
-    a, b = (_as_words(side) if flagged else side.values for side in (one, other))
+    a, b = (as_words(side) if flagged else side.values for side in (one, other))
     texts = flagged or one.dtype.kind in "OUS"
+    if flagged:
+        a, b = (np.where(side == NOT_REQUESTED, "", side) for side in (a, b))
     missing = [values == "" if texts else np.isnan(values) for values in (a, b)]
     of_both = [mask.any([dim for dim in mask.dims if dim not in names]).broadcast_like(one) for mask in asked]
     masks = [mask.transpose(*names).values for mask in of_both]
@@ -319,14 +312,6 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray:
 def _labels(array: xr.DataArray, place: Iterable[int]) -> Labels:
     found = {str(name): array.indexes[name][int(at)] for name, at in zip(array.dims, place)}
     return {name: label if isinstance(label, str | int) else float(label) for name, label in found.items()}
-
-
-def _as_words(array: xr.DataArray) -> np.ndarray:
-    """Convert flags to words; empty where nothing was requested."""
-    known, back = np.unique(array.values, return_inverse=True)
-    words = flag_words(array)
-    said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]
-    return np.array(said, dtype=object)[back.ravel()].reshape(array.shape)
 
 
 def _excess_of_numbers(

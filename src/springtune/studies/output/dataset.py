@@ -24,7 +24,7 @@ from springtune.safe_io.files import replacing
 
 from ..config.kind import EMPTY_VALUES
 from ..config.model import STRAINED_REFERENCE
-from .answers import OWN_LAW_REFERENCES, sign_of_displacements
+from .answers import Variables, own_law, own_laws, sign_of_displacements
 
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
@@ -131,6 +131,8 @@ def most_requested(root: xr.Dataset, dimension: str) -> str:
     counts = requested.sum([name for name in requested.dims if name != dimension])
     return str(counts[dimension].values[int(counts.values.argmax())])
 
+
+SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 NO_NODE = EMPTY_VALUES["no node"]
 """Fill value of UGRID connectivities."""
@@ -283,39 +285,40 @@ def flag_words(array: xr.DataArray) -> dict[int, str]:
     return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
 
 
+def as_words(array: xr.DataArray) -> np.ndarray:
+    """Convert flags to words; empty for unknown ones."""
+    known, back = np.unique(array.values, return_inverse=True)
+    words = flag_words(array)
+    return np.array([words.get(int(one), "") for one in known], dtype=object)[back].reshape(array.shape)
+
+
 # -- the group and the labels that a figure shows ----------------------------------------------------------------------
 
 
 def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.Dataset:
     """Dataset of a group; `data` itself if it is no tree."""
-    if not isinstance(data, xr.DataTree):
-        if not alone:
-            raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
-        return data
-    if name == "/":
-        if not data.variables:
-            raise ValueError(
-                f"the dataset has no scenes of beams; it has {_quoted(f'/{one}' for one in data.children)}"
-            )
-        return data.to_dataset()
-    if name not in data.children:
-        raise ValueError(f"the dataset has no group '/{name}'; it has {_quoted(f'/{one}' for one in data.children)}")
-    return data[name].to_dataset()
+    if isinstance(data, xr.DataTree):
+        if not data.variables if name == "/" else name not in data.children:
+            lack = "scenes of beams" if name == "/" else f"group '/{name}'"
+            raise ValueError(f"the dataset has no {lack}; it has {_quoted(f'/{one}' for one in data.children)}")
+        return data[name].to_dataset()
+    if not alone:
+        raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
+    return data
 
 
 def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
     """Labels of a figure: the given ones, and the only label of each other dimension."""
     chosen = {name: label for name, label in selection.items() if name in present.dims}
-    given = [name for name, label in chosen.items() if label is not None]
-    for name in sorted(chosen, key=lambda name: name not in given):
+    for name, label in sorted(chosen.items(), key=lambda pair: pair[1] is None):
         found = labels_of(present, name)
-        if name in given and chosen[name] not in found:
-            raise ValueError(f"nothing has {name} {chosen[name]!r}; there is {_quoted(found)}")
+        if label is not None and label not in found:
+            raise ValueError(f"nothing has {name} {label!r}; there is {_quoted(found)}")
         if not found:
             raise ValueError("nothing to plot: the dataset has no cell of the selection")
-        if name not in given and len(found) > 1:
+        if label is None and len(found) > 1:
             raise ValueError(f"choose one {name}: {_quoted(found)}")
-        chosen[name] = chosen[name] if name in given else found[0]
+        chosen[name] = found[0] if label is None else label
         present = present.sel({name: [chosen[name]]})  # later dimensions are seen under this label
     return chosen
 
@@ -367,14 +370,9 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     if not chosen:
         return data
     found = data.sel(chosen)
-    own = {
-        name: (("material",) if name.startswith("material") else ("beam",))
-        for name in OF_BODIES.values()
-        if name in found
-    }
-    for name, dimensions in own.items():  # what belongs to a body is the same under all loads, but for what is swept
-        others = [one for one in found[name].dims if one not in dimensions]
-        found[name] = found[name].isel(dict.fromkeys(others, -1), drop=True) if others else found[name]
+    for name in {*OF_BODIES.values()} & {*found.variables}:  # of a body, and so the same under all loads but for sweeps
+        body = name.partition("_")[0]
+        found[name] = found[name].isel({one: -1 for one in found[name].dims if one != body}, drop=True)
     return found.reset_coords([name for name in chosen if name in found.coords])
 
 
@@ -395,9 +393,8 @@ def labels_of(present: xr.DataArray, name: str) -> list[Label]:
 
 def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label]]:
     """Labels of present cells over some dimensions, the last name fastest."""
-    there = present.any([dimension for dimension in present.dims if dimension not in names]).transpose(*names)
-    labels = [there[name].values.tolist() for name in names]
-    return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
+    there = present.any([dimension for dimension in present.dims if dimension not in names])
+    return records(xr.Dataset(), there.transpose(*names), ())
 
 
 def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> list[dict[str, Any]]:
@@ -405,8 +402,7 @@ def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> li
     places = dict(zip(map(str, present.dims), np.nonzero(present.values)))
     columns = {name: present[name].values[numbers].tolist() for name, numbers in places.items()}
     for name in names:
-        dimensions = [str(one) for one in data[name].dims]
-        columns[name] = data[name].values[tuple(places[one] for one in dimensions)].tolist()
+        columns[name] = data[name].values[tuple(places[str(one)] for one in data[name].dims)].tolist()
     return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
 
@@ -432,43 +428,76 @@ def labelled_beam(data: xr.Dataset, name: str) -> str:
     """Beam name with its dimensions, see `springtune.problem.shapes.beam_label`."""
     if "beam_length" not in data:
         return str(name)
-    found = data[["beam_length", "beam_height"]]
-    found = found.sel(beam=name) if "beam" in found.dims else found
+    found = data.sel(beam=name) if "beam" in data.beam_length.dims else data
     return beam_label(str(name), float(found.beam_length), float(found.beam_height))
+
+
+def network(data: xr.DataTree, labels: dict[str, Label]) -> xr.Dataset:
+    """Network of one mesh with its fields, see `springtune.field`."""
+    fields = group(data, "fields")
+    # Of what is swept, fields are of one value each; the values of the scenes are no coordinates of theirs.
+    swept = [name for name in SWEPT if f"{SHOWN_PREFIX}{name}" in fields]
+    asked = {name: labels.pop(name) for name in swept if name in labels}
+    fields = fields.drop_vars(swept, errors="ignore")
+    meshes = ("beam", "mesh_type", "mesh_size")
+    for name, label in labels.items():
+        if name not in fields.indexes:
+            known = ", ".join(map(str, fields.indexes))
+            raise ValueError(f"there is no dimension '{name}' to choose of; known: {known}")
+        if name not in meshes and label not in fields[name].values.tolist():
+            raise ValueError(f"nothing has {name} {label!r}; there is {_quoted(fields[name].values.tolist())}")
+    chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
+    found = fields.sel(labels | chosen).load()
+    for name in swept:
+        kept = found[f"{SHOWN_PREFIX}{name}"]
+        known = np.unique(kept.values[np.isfinite(kept.values)]).tolist()
+        if name in asked and known != [asked[name]]:
+            listed = ", ".join(map(repr, known)) or "none"
+            raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
+        found = found.assign_coords({name: kept}).drop_vars(f"{SHOWN_PREFIX}{name}")
+    # One network of a group may lack particles, springs, cells and corners of cells that another has.
+    for name, dimension in (
+        ("x", "particle"),
+        (SPRING_NODES, "spring"),
+        (CELL_NODES, "cell"),
+        (CELL_NODES, "cell_corner"),
+    ):
+        there = found[name].notnull()
+        found = found.isel({dimension: there.any([one for one in there.dims if one != dimension]).values})
+    for name in (SPRING_NODES, CELL_NODES):
+        connectivity = found[name].fillna(NO_NODE).astype(NO_NODE.dtype)
+        connectivity.encoding = {"_FillValue": NO_NODE, "dtype": "int32"}
+        found[name] = connectivity.assign_attrs(found[name].attrs)
+    return found.assign_attrs(Conventions="CF-1.11 UGRID-1.0")
 
 
 # -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's in its plane ---------
 
 
-def own_law_references(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
-    """References of a material's own law, and the group without plane-strain numbers of plane-stress materials."""
-    laws = [kind for kind in OWN_LAW_REFERENCES if kind in data.reference.values]
+def variables(data: xr.Dataset) -> Variables:
+    """Dimensions and values of a group's variables and labels."""
+    return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
+
+
+def in_own_plane(data: xr.Dataset) -> xr.Dataset:
+    """Group without plane-strain numbers of materials in plane stress."""
     if "material_plane" not in data:
-        return [kind for kind in laws if kind != STRAINED_REFERENCE], data
+        return data
     own = (data.reference != STRAINED_REFERENCE) | (data.material_plane == "strain")
     numbers = {name: one for name, one in data.items() if one.dtype.kind == "f" and "reference" in one.dims}
-    return laws, data.assign({name: one.where(own) for name, one in numbers.items()}).drop_vars("material_plane")
+    return data.assign({name: one.where(own) for name, one in numbers.items()}).drop_vars("material_plane")
 
 
 def select_own_law(finite: xr.Dataset) -> xr.Dataset | None:
-    """Select the reference of each material's own law and plane."""
-    laws, finite = own_law_references(finite)
-    if not laws:
+    """Select the reference of each material's own law and plane; where none has a number, each says why."""
+    if not own_laws(found := variables(finite)):
         return None
-    found = finite.sel(reference=laws[-1], drop=True)
-    # A material has one of them; where none is there, each says why.
-    for law in laws[-2::-1]:
-        other = finite.sel(reference=law, drop=True)
-        there = other.reference_displacement.notnull()
-        found = found.copy()
-        for name, array in other.items() if there.any() else ():
-            own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
-            found[name] = array.where(own, found[name])
-    return found
+    dims, law, _ = own_law(found)
+    return in_own_plane(finite).isel(reference=xr.DataArray(law, dims=dims)).drop_vars("reference")
 
 
 def own_law_reference(cell: xr.Dataset, name: str) -> str | None:
     """Label of a material's own reference: a solved one if there is any; None without a reference."""
-    kinds, cell = own_law_references(cell)
-    there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
-    return next(iter(there or kinds[::-1]), None)
+    laws, cell = own_laws(variables(cell)), in_own_plane(cell)
+    there = [law for law in laws if np.isfinite(cell[name].sel(reference=law).values).any()]
+    return next(iter(there or laws[::-1]), None)

@@ -1,7 +1,7 @@
 """Plots of a single scene and of a single curve, and what figures of networks share."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,6 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.image import AxesImage
 
 from springtune.problem.compare import sign_sentence
-from springtune.problem.quantities import Status
 
 from . import style
 from .answers import ERROR_COLOURS, ERROR_RANGE
@@ -38,13 +37,13 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
     """Draw deformed springs coloured by force [N], and the outline at rest."""
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.2))
     largest = float(np.abs(forces).max()) or 1.0
-    outline = mesh.points[mesh.edges[mesh.on_outline]]
-    panel.add_collection(LineCollection(1e3 * outline, colors="0.6", linewidths=0.7))
+    outline = 1e3 * mesh.points[mesh.edges[mesh.on_outline]]
+    panel.add_collection(LineCollection(outline, colors="0.6", linewidths=0.7))
     moved = 1e3 * (mesh.points + displacements)[mesh.edges]
     lines = LineCollection(moved, array=forces, cmap="coolwarm", clim=(-largest, largest), linewidths=0.7)
     panel.add_collection(lines)
-    panel.figure.colorbar(lines, ax=panel, label="Spring force [N], tension positive", orientation="horizontal",
-                          aspect=40)  # fmt: skip
+    label = "Spring force [N], tension positive"
+    panel.figure.colorbar(lines, ax=panel, label=label, orientation="horizontal", aspect=40)
     panel.autoscale()
     panel.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", title=title)
     panel.grid(False)
@@ -57,8 +56,8 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.5))
     error, said = 100 * curve.error, []
     unit, written = style.power_of_ten(float(curve.stiffness.max()))
+    stiffness, colour = curve.stiffness / unit, style.line(0)["color"]
     panel.axhline(0.0, color="0.6", linewidth=0.7)
-    colour, stiffness = style.line(0)["color"], curve.stiffness / unit
     panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
     panel.plot(stiffness, np.where(curve.stable, np.nan, error), color=colour, linewidth=0.5, label="not stable")
     marks = {"best": curve.best_stiffness, "closed form": curve.predicted_stiffness}
@@ -69,10 +68,8 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
     known = error[np.isfinite(error)]
     if len(known):  # a beam that buckled errs by thousands
-        panel.set_ylim(
-            max(min(1.1 * known.min(), 0.0), -LARGEST_ERROR_SHOWN),
-            min(max(1.1 * known.max(), 1.0), LARGEST_ERROR_SHOWN),
-        )
+        low, high = min(1.1 * known.min(), 0.0), max(1.1 * known.max(), 1.0)
+        panel.set_ylim(*np.clip([low, high], -LARGEST_ERROR_SHOWN, LARGEST_ERROR_SHOWN))
         said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
     else:
         style.write_reason(panel, curve.message or "There is no reference, and so no error.", bare=False)
@@ -85,8 +82,7 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
     """Draw residuals over the noise of each column or field, over the largest load or coordinate."""
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN_WIDTH, 2.5))
     for number, (label, values) in enumerate(residuals.items()):
-        where = places[label]
-        along = where if where.ndim == 1 else np.repeat(where[:, 0], 2)
+        along = places[label] if places[label].ndim == 1 else np.repeat(places[label][:, 0], 2)
         panel.plot(along / np.abs(along).max(), values, ".", color=style.line(number)["color"], label=label)
     panel.axhline(0.0, color="0.6", linewidth=0.7)
     panel.set(xlabel="Load, or x, over its largest [1]", ylabel="Residual over noise [1]")
@@ -95,11 +91,6 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
 
 
 # -- networks of a dataset ---------------------------------------------------------------------------------------------
-
-
-def status_words(flags: "int | Iterable[int] | np.ndarray") -> str:
-    """Statuses of requested cells in words, each once."""
-    return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
 
 
 def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
@@ -135,15 +126,13 @@ def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, flo
 def magnification(fields: "xr.Dataset") -> float:
     """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
     places = np.concatenate([plane_vectors(fields, "{}"), plane_vectors(fields, "outline_{}")])
-    sizes = np.hypot(fields.reference_displacement_x.values, fields.reference_displacement_y.values)
-    if not np.isfinite(sizes).any():
-        sizes = np.hypot(fields.displacement_x.values, fields.displacement_y.values)
-    largest = np.max(sizes, where=np.isfinite(sizes), initial=0.0)
+    sizes = (np.hypot(*plane_vectors(fields, name).T) for name in ("reference_displacement_{}", "displacement_{}"))
+    largest = next(filter(None, (np.max(size, where=np.isfinite(size), initial=0.0) for size in sizes)), 0.0)
     factor = 0.07 * max(extent(places, (0.0, 0.0))) / largest if largest else 0.0
     if not factor or 0.4 < factor < 2:
         return 1.0
-    power = 10.0 ** math.floor(math.log10(factor))
-    return max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)) * power
+    steps = np.array([1, 2, 5]) * 10.0 ** math.floor(math.log10(factor))
+    return float(steps[steps <= factor * (1 + 1e-9)][-1])
 
 
 NETWORK_LINE_WIDTH = 0.35

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +18,7 @@ from springtune.safe_io.files import check_folder, replacing, write_text
 
 from ...registry import how_to_install
 from . import reading
-from .dataset import flag_words, is_flagged
+from .dataset import CELL_NODES, SPRING_NODES, as_words, is_flagged
 from .text import cell_text
 
 TABLE_ENDINGS = (".csv", ".parquet")
@@ -42,9 +43,7 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
     if not data.variables:
         others = ", ".join(node.path.strip("/") for node in tree.subtree if node.data_vars)
         raise RequestError(f"--group {group}: the group has no variables; give one of {others}")
-    rows = 1
-    for size in data.sizes.values():
-        rows *= size
+    rows = math.prod(data.sizes.values())
     if rows * len(data.variables) > MOST_NUMBERS:
         raise ValueError(
             f"group '{group}': {rows} rows of {len(data.variables)} columns, and at most {MOST_NUMBERS} values are "
@@ -53,19 +52,12 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
     asked = data.status != Status.NOT_REQUESTED if "status" in data else None
     for variable in data.data_vars:
         if is_flagged(data[variable]):
-            words = flag_words(data[variable])
-            found = np.array([words.get(int(value), "") for value in data[variable].values.ravel()], dtype=object)
-            data[variable] = data[variable].dims, found.reshape(data[variable].shape)
-    units = {
-        str(one): f"{one} [{data[one].attrs['units']}]"
-        for one in data.variables
-        if data[one].attrs.get("units", "1") not in ("", "1")
-    }
+            data[variable] = data[variable].dims, as_words(data[variable])
+    units = {str(name): one.attrs.get("units", "1") for name, one in data.variables.items()}
     frame = data.to_dataframe().reset_index() if data.sizes else pd.DataFrame([{n: data[n].item() for n in data}])
     if asked is not None and asked.dims:
-        wanted = asked.broadcast_like(xr.Dataset(coords=data.coords)) if set(asked.dims) < set(data.sizes) else asked
-        frame = frame[wanted.transpose(*data.sizes).values.ravel()]
-    return frame.rename(columns=units)
+        frame = frame[asked.broadcast_like(xr.Dataset(coords=data.coords)).transpose(*data.sizes).values.ravel()]
+    return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items() if unit not in ("", "1")})
 
 
 def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False) -> str:
@@ -121,8 +113,8 @@ def _write_scene(path: Path, network: xr.Dataset, labels: Mapping[str, object]) 
         return np.stack([network[names.format(axis)].values for axis in "xy"], axis=1)
 
     network = network.squeeze([name for name in labels if name in network.dims])  # a mesh may be of one cell
-    corners = network[reading.CELL_NODES].transpose("cell", ...).values
-    cells = {2: network[reading.SPRING_NODES].transpose("spring", ...).values}
+    corners = network[CELL_NODES].transpose("cell", ...).values
+    cells = {2: network[SPRING_NODES].transpose("spring", ...).values}
     cells |= {count: corners[(corners >= 0).sum(axis=1) == count][:, :count] for count in (3, 4)}
     points = {"displacement": vectors("displacement_{}")}
     expected = vectors("particle_reference_{}") if "particle_reference_x" in network else np.array(np.nan)

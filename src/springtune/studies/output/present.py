@@ -26,12 +26,15 @@ if TYPE_CHECKING:
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     """Draw the figures of outputs into ``folder/figures``, and write their other files."""
     made: list[Path] = []
-    figures = Path(folder) / "figures"
     with reading.open(dataset) as tree:
-        _choose_style(tree)
+        width, font_size = (float(tree.attrs.get(f"figure_{name}") or 0) for name in ("width", "font_size"))
+        if width or font_size:
+            from . import style  # here: a job that only writes tables needs no matplotlib
+
+            style.choose(width, font_size)
         for output in (outputs()[name] for name in names):
             if output.module:
-                made += _draw(output, tree, figures)
+                made += _draw(output, tree, Path(folder) / "figures")
             into = Path(folder) / output.into
             if output.page:
                 made += [into / name for name in write_page(tree, into)]
@@ -46,17 +49,7 @@ def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> No
     write_json(record, {"digest": digest})
 
 
-def _choose_style(tree: xr.DataTree) -> None:
-    """Draw at the width and with the size of text that the study asks for."""
-    asked = {name: tree.attrs.get(f"figure_{name}") for name in ("width", "font_size")}
-    if chosen := {name: float(value) for name, value in asked.items() if value}:
-        from . import style  # here: a job that only writes tables needs no matplotlib
-
-        style.choose(**chosen)
-
-
 def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
-    # Here: a job that only writes tables needs no matplotlib.
     import matplotlib.pyplot as plt
 
     from . import style
@@ -104,16 +97,16 @@ def html(tables: Iterable[Mapping[str, Any]], tree: xr.DataTree) -> str:
     """Page of tables: each has a stem, a title, rows, and may have a note, remarks, marks and the cells `shown`."""
     import jinja2  # here: few jobs write the page
 
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("springtune.studies.output", ""),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    loader = jinja2.PackageLoader("springtune.studies.output", "")
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     root, scenes = tree.to_dataset(), any("marks" in table for table in tables)
-    shown = [
-        dict(table) | {"html": _html_table(table), "beyond": _note_on_left_out_rows(table["rows"])} for table in tables
-    ]
+    shown = []
+    for table in tables:
+        cells, count = table["shown"] if "shown" in table else texts(table["rows"]), len(table["rows"])
+        beyond = f"The first {MOST_ROWS} of {count} rows; the file has all of them: " if count > MOST_ROWS else ""
+        shown.append(
+            dict(table) | {"html": cells.to_html(index=False, border=0) if len(cells) else "", "beyond": beyond}
+        )
     return environment.get_template("page.html").render(
         tables=shown,
         scenes=scenes,
@@ -124,24 +117,11 @@ def html(tables: Iterable[Mapping[str, Any]], tree: xr.DataTree) -> str:
     )
 
 
-def _html_table(table: Mapping[str, Any]) -> str:
-    """Table without its rows beyond `MOST_ROWS`."""
-    cells = table["shown"] if "shown" in table else texts(table["rows"])
-    return str(cells.to_html(index=False, border=0)) if len(cells) else ""
-
-
-def _note_on_left_out_rows(rows: list[Mapping[str, Any]]) -> str:
-    """Note on rows that are left out."""
-    return f"The first {MOST_ROWS} of {len(rows)} rows; the file has all of them: " if len(rows) > MOST_ROWS else ""
-
-
 def _beam_sizes(root: xr.Dataset) -> list[str]:
     """Extents of a study's beams; their thickness where it is not swept."""
     names = [name for name in ("beam_length", "beam_height", "beam_thickness") if name in root]
-    if not names:
-        return []
-    frame = root[[name for name in names if root[name].dims == ("beam",)]].to_dataframe()
-    sizes = (1e3 * frame.filter(like="beam_")).dropna()
+    names = [name for name in names if root[name].dims == ("beam",)]
+    sizes = 1e3 * root[names].to_dataframe()[names].dropna() if names else pd.DataFrame()
     return [f"{beam}, {' x '.join(f'{size:.4g}' for size in row)} mm" for beam, row in zip(sizes.index, sizes.values)]
 
 
@@ -164,8 +144,8 @@ def _column_texts(name: str, values: list[Any]) -> list[str]:
 
 def error_decimals(values: Iterable[float]) -> int:
     """Decimals of errors [%] for three digits of their median."""
-    sizes = np.abs([value for value in values if np.isfinite(value) and value])
-    return int(np.clip(decimals([float(np.median(sizes))], 3) or 0, 1, 4)) if len(sizes) else 2
+    sizes = [abs(value) for value in values if np.isfinite(value) and value]
+    return int(np.clip(decimals([float(np.median(sizes))], 3) or 0, 1, 4)) if sizes else 2
 
 
 def head(name: str) -> str:

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from .dataset import Label
 
-SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
-
 REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
 
 OPENING_BYTES = 1e9
@@ -178,56 +176,7 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
         raise ValueError(f"data: {type(data).__name__} is no dataset; give what springtune.open returns")
     if "fields" not in data.children:
         raise ValueError(without_fields(data))
+    from .dataset import network
+
     with guarded("the group '/fields'"):
-        return _field(data, labels)
-
-
-def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Dataset":
-    import numpy as np
-
-    from springtune.problem.quantities import SWEPT
-
-    from .dataset import SHOWN_PREFIX, choose, group
-
-    fields = group(data, "fields")
-    # Of what is swept, fields are of one value each; the values of the scenes are no coordinates of theirs.
-    swept = [name for name in SWEPT if f"{SHOWN_PREFIX}{name}" in fields]
-    asked = {name: labels.pop(name) for name in swept if name in labels}
-    fields = fields.drop_vars(swept, errors="ignore")
-    meshes = ("beam", "mesh_type", "mesh_size")
-    for name, label in labels.items():
-        if name not in fields.dims or name not in fields.coords:
-            known = ", ".join(str(one) for one in fields.dims if one in fields.coords)
-            raise ValueError(f"there is no dimension '{name}' to choose of; known: {known}")
-        if name not in meshes and label not in fields[name].values.tolist():
-            raise ValueError(
-                f"nothing has {name} {label!r}; there is {', '.join(map(repr, fields[name].values.tolist()))}"
-            )
-    chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
-    found = fields.sel(labels | chosen).load()
-    for name in swept:
-        kept = found[f"{SHOWN_PREFIX}{name}"]
-        known = np.unique(kept.values[np.isfinite(kept.values)]).tolist()
-        if name in asked and known != [asked[name]]:
-            listed = ", ".join(map(repr, known)) or "none"
-            raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
-        found = found.assign_coords({name: kept}).drop_vars(f"{SHOWN_PREFIX}{name}")
-    found = network(found)
-    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
-    return found
-
-
-def network(found: "xarray.Dataset") -> "xarray.Dataset":
-    """Leave out particles, springs and cells that one network of a group lacks."""
-    import numpy as np
-
-    for name, dimension in (("x", "particle"), (SPRING_NODES, "spring"), (CELL_NODES, "cell")):
-        there = found[name].notnull().values.reshape(found.sizes[dimension], -1).any(axis=1)
-        found = found.isel({dimension: np.flatnonzero(there)})
-    corners = found[CELL_NODES].notnull().any("cell").values
-    found = found.isel(cell_corner=np.flatnonzero(corners))
-    for name in (SPRING_NODES, CELL_NODES):
-        connectivity = found[name].fillna(-1).astype("int32")
-        connectivity.encoding = {"_FillValue": np.int32(-1), "dtype": "int32"}
-        found[name] = connectivity.assign_attrs(found[name].attrs)
-    return found
+        return network(data, labels)

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
 from springtune.problem.quantities import Status
 
@@ -49,8 +49,8 @@ TEXT_SIZES = ("axes.labelsize", "axes.titlesize", "figure.titlesize", "font.size
 """Settings that follow the size of text."""
 
 
-def choose(width: float | None = None, font_size: float | None = None) -> None:
-    """Choose the width of a column [m] and the size of text [pt] of all figures of this process."""
+def choose(width: float, font_size: float) -> None:
+    """Choose the width of a column [m] and the size of text [pt] of all figures of this process; 0 leaves it."""
     global COLUMN_WIDTH, PAGE_WIDTH, SMALL_TEXT
     if width:
         wide = width / METRES_PER_INCH
@@ -93,14 +93,12 @@ def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
     """Numbers such as 0.5, 2 and 300 in place of powers on a logarithmic axis."""
     for name in axes:
         chosen, (low, high) = getattr(panel, f"{name}axis"), sorted(getattr(panel, f"get_{name}lim")())
-        chosen.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        chosen.set_major_formatter(lambda value, _: f"{value:g}")
         if low <= 0 or high / low > 150:
             chosen.set_minor_locator(NullLocator())
             continue
         kept = "25" if high / low > 5 else "235" if high / low > 3 else "2345678"
-        chosen.set_minor_formatter(
-            FuncFormatter(lambda value, _, kept=kept: f"{value:g}" if f"{value:e}"[0] in kept else "")
-        )
+        chosen.set_minor_formatter(lambda value, _, kept=kept: f"{value:g}" if f"{value:e}"[0] in kept else "")
 
 
 def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
@@ -221,8 +219,7 @@ def group_equal_curves(curves: dict[str, np.ndarray], within: float) -> list[lis
     groups: list[list[str]] = []
     for name, values in curves.items():
         for group in groups:
-            other = curves[group[0]]
-            if (np.isnan(values) == np.isnan(other)).all() and not (np.abs(values - other) > within).any():
+            if np.allclose(values, curves[group[0]], rtol=0, atol=within, equal_nan=True):
                 group.append(name)
                 break
         else:
@@ -242,9 +239,14 @@ def sizes_axis(panel: Axes, sizes: np.ndarray, count: int) -> list[np.ndarray]:
     return [sizes] * count
 
 
+def status_words(flags: int | Iterable[int] | np.ndarray) -> str:
+    """Statuses of requested cells in words, each once."""
+    return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
+
+
 def count_statuses(flags: np.ndarray) -> dict[str, int]:
     """Number of requested cells by status in words."""
-    return {str(Status(flag)).replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
+    return {status_words(flag): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
 
 
 # -- texts -------------------------------------------------------------------------------------------------------------
@@ -263,7 +265,7 @@ def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterab
     handles = [*sorted(ends, key=lambda line: -ends[line]), *key]
     if handles:
         arranged = panel.figure.get_layout_engine() is not None
-        place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
+        place: Any = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
         texts = [wrap_to_panel(panel, [str(one.get_label())], share=WIDEST_NAME_SHARE) for one in handles]
         panel.legend(handles, texts, handlelength=2.2, borderaxespad=0.3, labelspacing=0.35, **place)
     add_note(panel, said)

@@ -13,7 +13,7 @@ from springtune.problem.quantities import Status
 from springtune.safe_io.texts import aligned, shown
 
 from . import reading
-from .answers import Columns, Variables, definition_errors, has_own_law, requested_cells, what_to_type
+from .answers import Columns, Variables, definition_errors, own_laws, requested_cells, what_to_type
 from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, place_text, range_text, without_numbers
 
 CELLS_NAMED = 3
@@ -137,7 +137,7 @@ def _errors(
             f"{str(error.name).replace('_', ' ')}s, (network - reference) / |reference|, of solved scenes within the "
             "reference",
         )
-        if finite is not None and has_own_law(finite):
+        if finite is not None and own_laws(finite):
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         by = [name for name in ("definition", "kinematics") if name in cells]
         others = [str(name) for name in error.dims if name not in by]

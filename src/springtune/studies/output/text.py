@@ -24,11 +24,8 @@ def paragraphs(parts: Iterable[Iterable[str]]) -> str:
 
 def bytes_text(number: float) -> str:
     """Bytes with a readable unit."""
-    for unit in ("B", "kB", "MB"):
-        if number < 1000:
-            return f"{number:.3g} {unit}"
-        number /= 1000
-    return f"{number:.3g} GB"
+    power = min(len(f"{number:.0f}") - 1, 9) // 3
+    return f"{number / 1000**power:.3g} {('B', 'kB', 'MB', 'GB')[power]}"
 
 
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
@@ -56,9 +53,9 @@ def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
 
 def place_text(data: "xr.Dataset", dims: Iterable[Hashable], place: Iterable[int]) -> str:
     """Labels of a cell of a dataset for readers, by its place along each dimension."""
-    pairs = [(str(name), data[name] if name in data.coords else None, int(at)) for name, at in zip(dims, place)]
-    units = {name: str(axis.attrs.get("units", "1")) for name, axis, _ in pairs if axis is not None}
-    return cell_text({name: at if axis is None else axis.values[at] for name, axis, at in pairs}, units)
+    places = {str(name): int(at) for name, at in zip(dims, place)}
+    units = {name: str(data[name].attrs.get("units", "1")) for name in places if name in data.coords}
+    return cell_text({name: data[name].values[at] if name in units else at for name, at in places.items()}, units)
 
 
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")

@@ -161,7 +161,7 @@ def _draw_errors(panels, cut, name, points):
 
 def _reason_without_error(cut):
     """Reason why a quantity has no error."""
-    states = drawing.status_words(cut.status.values) or "not asked for"
+    states = style.status_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"
 
@@ -340,5 +340,5 @@ def _draw_network(panel, one, state, scale, most):
     notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []
     if STATUS[int(state.status)] != "solved":
         message = f": {state.message.item()[:120]}" if lines is None else ""
-        notes.append(drawing.status_words(int(state.status)) + message)
+        notes.append(style.status_words(int(state.status)) + message)
     return notes

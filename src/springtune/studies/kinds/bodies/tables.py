@@ -7,7 +7,7 @@ from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT
 
-from ...output.dataset import STATUS, cells, group, labels_of, own_law_references, records, select_own_law, table_rows
+from ...output.dataset import STATUS, cells, group, in_own_plane, labels_of, records, select_own_law, table_rows
 from ...output.present import MOST_ROWS, error_decimals, head
 from ...output.text import decimals, number, range_text
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
@@ -152,8 +152,7 @@ def _rows(data, present, order, network, reference, error):
 
 def _finite_strain_table(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
-    _, finite = own_law_references(finite)
-    finite = finite.assign(displacement=root.displacement)
+    finite = in_own_plane(finite).assign(displacement=root.displacement)
     order = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
     present = finite.deformation_error.notnull() & (finite.kinematics != "linear")
     rows = _rows(finite, present, order, "displacement", "reference_displacement", "deformation_error")
@@ -169,7 +168,7 @@ def _finite_strain_table(finite, root):
 
 def _block_table(block, root):
     """Middle of the pressed face: linear networks against small strain, others against finite strain if known."""
-    _, block = own_law_references(block)
+    block = in_own_plane(block)
     order = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
     present = block.face_error.notnull()
     if block.sizes["reference"] > 1:
