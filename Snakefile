@@ -28,7 +28,7 @@ include: "workflow/rules/stages.smk"
 include: "workflow/rules/outputs.smk"
 
 
-if Path(rules.collect.output.dataset) != RESULTS / rerun.DATASET:
+if Path(rules.collect.output.dataset) != RESULTS / plan.DATASET:
     refused("module of springtune: results are in results/<study> and take no other prefix; leave the prefix out")
 
 

@@ -91,13 +91,13 @@ def megabytes(*paths: Path) -> float:
 def plan_and_note(config: str) -> None:
     """Plan a study, write its tasks and note what later steps are called with."""
     from springtune.studies.kinds import load_study
-    from springtune.studies.runs import rerun
+    from springtune.studies.runs import plan
 
     loaded = load_study(config)
-    jobs = rerun.jobs(loaded, Path("results") / loaded.name)
+    jobs = plan.jobs(loaded, Path("results") / loaded.name)
     for job in jobs.values():
         job.write()
-    found = {"scenes": len(loaded.scenes), "digest": jobs[rerun.COLLECT].digest}
+    found = {"scenes": len(loaded.scenes), "digest": jobs[plan.COLLECT].digest}
     found["stages"] = {name: [job.stage.name, job.digest] for name, job in jobs.items() if job.stage}
     Path("plan.json").write_text(json.dumps(found))
 

@@ -73,7 +73,7 @@ def test_a_new_kind_in_the_references(lift):
 
 def test_a_new_kind_through_a_study(lift, tmp_path):
     study = load_text(tmp_path, STUDIES["loads"])
-    jobs = plan.plan(study, tmp_path)
+    jobs = plan.stage_jobs(study, tmp_path)
     do_stages(study, tmp_path, "mesh", "reference", "solve")
     tasks = jobs["solve_0"].content
     (family,) = tasks["files"]

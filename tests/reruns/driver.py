@@ -12,7 +12,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1] / "support"))  # for `campaigns`, where this is a program
 
 import springtune as st
-from springtune.studies.runs import attempts, rerun
+from springtune.studies.runs import attempts, plan
 
 from campaigns import Campaign, held
 
@@ -80,7 +80,7 @@ def write_mesh(path, shift=0.0):
 
 def dataset(folder):
     """What the dataset of a study holds, without times."""
-    return held(folder / FOLDER / rerun.DATASET)
+    return held(folder / FOLDER / plan.DATASET)
 
 
 if __name__ == "__main__":  # with the package of another folder

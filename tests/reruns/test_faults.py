@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from springtune.studies.runs import rerun
+from springtune.studies.runs import plan
 
 from campaigns import Campaign
 from tables import STUDIES
@@ -21,11 +21,11 @@ KILLS = (1, 2, 3, 5, 8)
 
 
 def campaign():
-    Campaign("survival.yaml").finish(rerun.COLLECT)
+    Campaign("survival.yaml").finish(plan.COLLECT)
 
 
 def values():
-    with xr.open_dataset(FOLDER / rerun.DATASET) as dataset:
+    with xr.open_dataset(FOLDER / plan.DATASET) as dataset:
         return dataset[["displacement", "stiffness"]].load()
 
 
@@ -65,7 +65,7 @@ def good(whole):
     """The same command again gives the values of an undisturbed run."""
     campaign()
     assert values().equals(whole[1])
-    assert rerun.COLLECT not in Campaign("survival.yaml").due()
+    assert plan.COLLECT not in Campaign("survival.yaml").due()
 
 
 @pytest.mark.parametrize("number", KILLS)
@@ -83,7 +83,7 @@ def test_a_killed_run_goes_on(whole, started, monkeypatch, number):
         campaign()
 
     assert os.WIFSIGNALED(forked(killed))
-    assert not (FOLDER / rerun.DATASET).exists()
+    assert not (FOLDER / plan.DATASET).exists()
     good(whole)
 
 
@@ -112,7 +112,7 @@ def test_a_damaged_file_is_named_or_made_again(whole, tmp_path, monkeypatch, how
         if how == "flipped":
             content[middle] ^= 0xFF
         path.write_bytes(content if how == "flipped" else content[: middle if how == "cut" else 0])
-        (FOLDER / rerun.DATASET).unlink()  # what is stored is read again
+        (FOLDER / plan.DATASET).unlink()  # what is stored is read again
         try:
             campaign()
         except SystemExit as error:

@@ -11,8 +11,7 @@ from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.kind import mesh_key, stem
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
-from springtune.studies.runs import attempts, job, keys, rerun
-from springtune.studies.runs.plan import plan
+from springtune.studies.runs import attempts, job, keys, plan
 
 TIMES = re.compile("seconds|created|history|git_")
 """Names of values that are others in every run or checkout."""
@@ -36,7 +35,7 @@ def refusal(folder, text, name="study.yaml"):
 
 def do_stages(study, folder, *stages):
     """Run the jobs of a study, or of some of its stages, and assert that no task is broken."""
-    for one in plan(study, folder).values():
+    for one in plan.stage_jobs(study, folder).values():
         if not stages or one.stage.name in stages:
             attempts.do_tasks(one.stage.module, one.content)
 
@@ -63,21 +62,21 @@ class Campaign:
             cache.cache_clear()
         self.config, self.study = str(config), st.load_study(config)
         self.folder = Path("results") / self.study.name
-        self.jobs = rerun.jobs(self.study, self.folder)
+        self.jobs = plan.jobs(self.study, self.folder)
         self.bundles = {name: job for name, job in self.jobs.items() if job.stage}
 
     def due(self):
         """Names of the jobs that are to run, in order."""
         found = []
         for name, one in self.jobs.items():
-            if rerun.rerun_reason(one) or self.before(name) & set(found):
+            if plan.rerun_reason(one) or self.before(name) & set(found):
                 found.append(name)
         return found
 
     def before(self, name):
         """Jobs that a job comes after."""
         if name not in self.bundles:
-            return {*self.bundles} if name == rerun.COLLECT else {rerun.COLLECT}
+            return {*self.bundles} if name == plan.COLLECT else {plan.COLLECT}
         stage, label = self.bundles[name].stage, self.bundles[name].label
         others = self.bundles.items()
         same = {other for other, job in others if job.stage.name == stage.like and job.label == label}
@@ -102,20 +101,20 @@ class Campaign:
 
     def collected(self):
         """The dataset, when all that it is made of has run."""
-        self.finish(rerun.COLLECT)
+        self.finish(plan.COLLECT)
         return reading.open(self.folder)
 
     def do(self, name):
         """A job, by the function that its rule calls."""
-        one, dataset = self.jobs[name], str(self.folder / rerun.DATASET)
+        one, dataset = self.jobs[name], str(self.folder / plan.DATASET)
         if name in self.bundles:
             self.do_stage(name)
-        elif name == rerun.COLLECT:
+        elif name == plan.COLLECT:
             collect.main(self.config, str(self.folder), dataset, str(one.record), one.digest)
-        elif name == rerun.BROWSE:
-            browse.main(dataset, one.products[0], str(one.record), one.digest, *rerun.linked_files(self.study))
+        elif name == plan.BROWSE:
+            browse.main(dataset, one.products[0], str(one.record), one.digest, *plan.linked_files(self.study))
         else:
-            names = [one.name for one in rerun.output_jobs(self.study)[name]]
+            names = [one.name for one in plan.output_jobs(self.study)[name]]
             present.main(dataset, str(self.folder), str(one.record), one.digest, *names)
 
     def do_stage(self, name):

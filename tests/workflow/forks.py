@@ -10,7 +10,7 @@ import snakemake.report.html_reporter  # noqa: F401
 from snakemake.cli import get_argument_parser
 
 # noqa: F401
-from springtune.studies.runs import rerun  # noqa: F401
+from springtune.studies.runs import plan  # noqa: F401
 from springtune.studies.runs.keys import stage_key
 from springtune.studies.runs.plan import stages
 

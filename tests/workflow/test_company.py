@@ -6,7 +6,7 @@ import pytest
 
 from springtune.studies.kinds import collect, load_study
 from springtune.studies.runs import attempts
-from springtune.studies.runs.plan import plan
+from springtune.studies.runs.plan import stage_jobs
 
 from campaigns import do_stages, held
 from tables import STUDIES
@@ -42,7 +42,7 @@ def test_what_was_stored_before_does_not_matter(study, tmp_path):
     """A random half of the tasks of each job first; then a few at a time; then all that is left."""
     generator = random.Random(0)
     do_stages(study, tmp_path / "usual")
-    for job in plan(study, tmp_path / "parts").values():
+    for job in stage_jobs(study, tmp_path / "parts").values():
         every = sorted(keys(job.content))
         generator.shuffle(every)
         if not job.stage.module.endswith("calibrate"):  # one result of all curves

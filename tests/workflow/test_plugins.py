@@ -80,10 +80,10 @@ def test_a_scene_moves_in_an_engine_of_a_package(run, site):
 JOBS = """
 from pathlib import Path
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import rerun
+from springtune.studies.runs import plan
 study = load_study("config/even.yaml")
-jobs = rerun.jobs(study, Path("results/even"))
-print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.rerun_reason(job)])
+jobs = plan.jobs(study, Path("results/even"))
+print(*[name.partition("_")[0] for name, job in jobs.items() if plan.rerun_reason(job)])
 """
 
 SPRINGS, METADATA = "springtune_example/springs.py", "springtune_example-1.0.dist-info/METADATA"

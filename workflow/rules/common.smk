@@ -21,7 +21,7 @@ from springtune.safe_io.texts import rst
 from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import locks, rerun
+from springtune.studies.runs import locks, plan
 from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder
 
 BEGUN = time.time()
@@ -90,10 +90,10 @@ CONFIG = chosen_study()
 gc.disable()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
-JOBS = rerun.jobs(STUDY, RESULTS)
+JOBS = plan.jobs(STUDY, RESULTS)
 gc.freeze()
 gc.enable()
-rerun.STUDIES_READ.append((STUDY, JOBS))
+plan.STUDIES_READ.append((STUDY, JOBS))
 BUNDLES = [name for name, job in JOBS.items() if job.stage]
 """Names of all jobs before the dataset."""
 
@@ -133,7 +133,7 @@ CAPTIONS = {path.stem for path in (SOURCE / "workflow/report").glob("*.rst")}
 def in_report(one):
     """Figures and tables of an output; browsable figures and all tables go into the report."""
     of_figures = one.figures(STUDY)
-    paths = [RESULTS / file for file in rerun.output_files(one, STUDY)]
+    paths = [RESULTS / file for file in plan.output_files(one, STUDY)]
     chosen = [of_figures.get(path.stem, {}) if path.parent.name == "figures" else {} for path in paths]
     return [
         shown(one, path, selection) if path.parent.name == "tables" or path.suffix == f".{SHOWN}" else path
@@ -158,10 +158,10 @@ def begin():
     if locks.LOCKED_NOTES:
         return
     try:
-        for _, jobs in rerun.STUDIES_READ:
+        for _, jobs in plan.STUDIES_READ:
             locks.check_idle(jobs["collect"].folder)
-        locks.lock([jobs["collect"].folder for _, jobs in rerun.STUDIES_READ])
-        for one, jobs in rerun.STUDIES_READ:
+        locks.lock([jobs["collect"].folder for _, jobs in plan.STUDIES_READ])
+        for one, jobs in plan.STUDIES_READ:
             folder = jobs["collect"].folder
             remove_unfinished(folder)
             reset_future_times(folder)  # Snakemake refuses products that are older than what they are made of
@@ -187,6 +187,6 @@ def end(how):
     for thread in threading.enumerate():
         if isinstance(thread, threading.Timer):  # Snakemake's, to look for jobs to start: it would hold up the end
             thread.cancel()
-    text = getattr(summary, how)(*rerun.STUDIES_READ[0], BEGUN)
-    text += "".join(summary.beside(*one, BEGUN) for one in rerun.STUDIES_READ[1:])
+    text = getattr(summary, how)(*plan.STUDIES_READ[0], BEGUN)
+    text += "".join(summary.beside(*one, BEGUN) for one in plan.STUDIES_READ[1:])
     logger.info(text, extra={"ends": True})

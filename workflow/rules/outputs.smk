@@ -1,6 +1,6 @@
 """Figures, tables and the page to browse, from the dataset."""
 
-MADE = rerun.output_jobs(STUDY)
+MADE = plan.output_jobs(STUDY)
 FIGURES_AND_TABLES = {job: [path for one in made for path in in_report(one)] for job, made in MADE.items()}
 
 for job, made in MADE.items():  # outputs of one job share the dataset that it reads
@@ -35,13 +35,13 @@ rule browse:
         dataset=rules.collect.output.dataset,
     output:
         page=report(
-            RESULTS / rerun.PAGE, caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}
+            RESULTS / plan.PAGE, caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}
         ),
         done=JOBS["browse"].record,
     params:
         digest=JOBS["browse"].digest,
         # What the page links to; other jobs make it meanwhile.
-        files=rerun.linked_files(STUDY),
+        files=plan.linked_files(STUDY),
     log:
         RESULTS / "logs/browse.log",
     benchmark:

@@ -3,7 +3,7 @@
 from springtune.studies.paper import PaperError, check_typst
 
 PAPER_SOURCE = SOURCE / "workflow/paper"
-PAPER_DATASETS = [Path("results") / name / rerun.DATASET for name in rerun.PAPER_STUDIES]
+PAPER_DATASETS = [Path("results") / name / plan.DATASET for name in plan.PAPER_STUDIES]
 
 
 # By the words of the command, since Snakemake has the targets after the Snakefile was read. Who wants neither the paper
@@ -12,14 +12,14 @@ TARGETS = sys.argv[1:]
 PAPER_WANTED = any(word == "paper" or word.endswith("_paper") or Path(word).name == "paper.pdf" for word in TARGETS)
 
 if PAPER_WANTED:
-    PAPER = rerun.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
+    PAPER = plan.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
     try:  # now, and not when the studies are done
         check_typst()
     except PaperError as error:
         refused(error)
 
-if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_STUDIES)) for word in TARGETS):
-    for name in rerun.PAPER_STUDIES:
+if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in plan.PAPER_STUDIES)) for word in TARGETS):
+    for name in plan.PAPER_STUDIES:
         if name != STUDY.name:
             prefix = f"{name}_"
 

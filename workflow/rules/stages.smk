@@ -113,9 +113,9 @@ rule collect:
     input:
         [JOBS[name].record for name in BUNDLES],
     output:
-        dataset=RESULTS / rerun.DATASET,
+        dataset=RESULTS / plan.DATASET,
         summary=report(
-            RESULTS / rerun.SUMMARY, caption="../report/summary.rst", category="summary", labels={"name": "summary"}
+            RESULTS / plan.SUMMARY, caption="../report/summary.rst", category="summary", labels={"name": "summary"}
         ),
         done=JOBS["collect"].record,
     params:

@@ -148,14 +148,14 @@ def scenes(config: Path, results: Path) -> None:
 
 def _stored_text(study: "Study", folder: Path) -> str:
     """Text on a study's stored results, and on what a run computes."""
-    from ..studies.runs import plan, rerun, store
+    from ..studies.runs import plan, store
 
     if not (folder / TASKS).exists():  # planning 10,000 scenes takes a second
         return f"nothing is stored in {folder}"
     asked, stored = Counter[str](), Counter[str]()
-    for job in plan.plan(study, folder).values():
+    for job in plan.stage_jobs(study, folder).values():
         assert job.stage  # of a plan
-        done = not rerun.rerun_reason(job)
+        done = not plan.rerun_reason(job)
         for file in job.content["files"]:
             keys, path = {task["key"] for task in file["tasks"]}, Path(job.content["folder"], f"{file['name']}.h5")
             asked[job.stage.name] += len(keys)
@@ -205,7 +205,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     """
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study  # here, so that --help does not wait for it
-    from ..studies.runs.rerun import PAPER_STUDIES
+    from ..studies.runs.plan import PAPER_STUDIES
 
     gc.disable()  # scenes and their tasks stay to the end: collecting garbage among them takes a sixth of the time
     named = bool(arguments) and not arguments[0].startswith("-")
@@ -334,11 +334,11 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
 
 def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
     """Records of outdated jobs, with the reasons; None if a job was never done. Missing files are printed."""
-    from ..studies.runs import rerun
+    from ..studies.runs import plan
 
-    each = [rerun.outdated(study, _results(study)) for study in studies]
+    each = [plan.outdated(study, _results(study)) for study in studies]
     found = {record: why for one in each for record, why in (one or {}).items()}
-    for why in filter(rerun.is_missing, found.values()):
+    for why in filter(plan.is_missing, found.values()):
         click.echo(f"{why}; {remedy}", err=True)
     return found if found or None not in each else None
 

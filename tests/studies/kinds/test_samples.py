@@ -20,7 +20,7 @@ from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.kind import MOST_SOLVED_ROWS
 from springtune.studies.runs import store
 from springtune.studies.runs.attempts import Attempts
-from springtune.studies.runs.plan import plan
+from springtune.studies.runs.plan import stage_jobs
 
 import tables
 from campaigns import Campaign, load_text
@@ -379,7 +379,7 @@ def networks(folder, *replaced, spent=None):
 
 def content_of(name, study, folder):
     """Content of a job with all tasks of a stage of samples, and its first file."""
-    (content,) = (job.content for job in plan(study, folder).values() if job.stage.name == name)
+    (content,) = (job.content for job in stage_jobs(study, folder).values() if job.stage.name == name)
     return content, content["files"][0]
 
 

@@ -17,7 +17,7 @@ from springtune.studies.kinds.bodies.kind import shape_mesh_keys, shape_referenc
 from springtune.studies.kinds.bodies.shapes import LARGEST_FILE_CHECKED
 from springtune.studies.output import present
 from springtune.studies.output.dataset import STATUS
-from springtune.studies.runs.rerun import output_files
+from springtune.studies.runs.plan import output_files
 
 from campaigns import do_stages, load_text
 from tables import STUDIES, cases

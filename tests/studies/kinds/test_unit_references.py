@@ -10,7 +10,7 @@ from springtune.studies.kinds.bodies import any_reference, collect
 from springtune.studies.kinds.bodies import kind as bodies
 from springtune.studies.kinds.bodies.kind import interpolants, reference_of, solved_reference, summary
 from springtune.studies.runs import store
-from springtune.studies.runs.plan import plan
+from springtune.studies.runs.plan import stage_jobs
 
 from campaigns import do_stages
 from tables import STUDIES
@@ -100,7 +100,7 @@ def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):
 
 def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     study = load(lengths(MANY))
-    (content,) = [job.content for job in plan(study, tmp_path).values() if job.stage.name == "reference"]
+    (content,) = [job.content for job in stage_jobs(study, tmp_path).values() if job.stage.name == "reference"]
     (task,) = (task for file in content["files"] for task in file["tasks"])
     # What a build that is not certified stores.
     path = tmp_path / "references" / f"{task['key']}.h5"

@@ -18,7 +18,7 @@ from snakemake_logger_plugin_springtune import Display, LogHandler
 from springtune.safe_io.files import write_json
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.output import summary, summing_up
-from springtune.studies.runs import rerun
+from springtune.studies.runs import plan
 
 from tables import STUDIES, beside, cases
 
@@ -92,7 +92,7 @@ def planned(tmp_path):
     """A study, its plan, and the names of its jobs."""
     (tmp_path / "two.yaml").write_text(STUDY)
     study, folder = st.load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
-    made = rerun.jobs(study, folder)
+    made = plan.jobs(study, folder)
     return study, made, [name for name, job in made.items() if job.stage]
 
 
@@ -116,7 +116,7 @@ class TestEnding:
         folder = planned[1]["collect"].folder
         (folder / "figures").mkdir(parents=True)
         (folder / "dataset.nc").touch()
-        (folder / rerun.SUMMARY).write_text("Told before\n")
+        (folder / plan.SUMMARY).write_text("Told before\n")
         text, *_ = self.finish(planned, "solve")
         assert "Told before" in text and "new      solve 4 of 4; the others were stored before" in text
         assert f"results  {folder}: dataset.nc, figures/" in text
@@ -125,8 +125,8 @@ class TestEnding:
     def test_a_summary_older_than_the_results_is_not_shown(self, planned):
         folder = planned[1]["collect"].folder
         folder.mkdir(parents=True)
-        (folder / rerun.SUMMARY).write_text("Told before\n")
-        os.utime(folder / rerun.SUMMARY, (0, 0))
+        (folder / plan.SUMMARY).write_text("Told before\n")
+        os.utime(folder / plan.SUMMARY, (0, 0))
         text, *_ = self.finish(planned, "solve")
         assert "Told before" not in text and "The dataset is older than these results." in text
 

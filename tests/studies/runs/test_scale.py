@@ -14,7 +14,7 @@ from counting import counted
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies import kind as bodies
 from springtune.studies.output import present
-from springtune.studies.runs import rerun, store
+from springtune.studies.runs import plan, store
 
 REPOSITORY = Path(__file__).parents[3]
 
@@ -41,7 +41,7 @@ def study_of(tool, tmp_path, monkeypatch):
 
 def planned(config):
     study = st.load_study(config)
-    return study, rerun.jobs(study, Path("results") / study.name)
+    return study, plan.jobs(study, Path("results") / study.name)
 
 
 def calls(function):

@@ -12,8 +12,7 @@ from springtune.safe_io.files import write_json, write_text
 from ..config.kind import StudyKind, kinds, outputs
 from ..config.model import Study
 from ..output import dataset, summing_up
-from ..runs import job, provenance, rerun
-from ..runs.plan import plan, rows
+from ..runs import job, plan, provenance
 from ..runs.store import DamagedError
 from . import load_study
 
@@ -28,13 +27,13 @@ def run(study: Study, folder: Path, output: Path) -> None:
         raise SystemExit(str(error)) from None
     except OSError as error:
         raise SystemExit(str(error)) from None
-    write_text(output.with_name(rerun.SUMMARY), summing_up.text(groups, study.title))
+    write_text(output.with_name(plan.SUMMARY), summing_up.text(groups, study.title))
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Write the dataset of a study, and the record of the job."""
     study = load_study(config)
-    if rerun.collect_digest(study, plan(study, Path(folder))) != digest:
+    if plan.collect_digest(study, plan.stage_jobs(study, Path(folder))) != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     run(study, Path(folder), Path(output))
     write_json(record, {"digest": digest})
@@ -47,7 +46,7 @@ def group_of(kind: StudyKind) -> dataset.Group:
 
 def _groups_of_tasks(kind: StudyKind, study: Study, folder: Path) -> dict[str, xr.Dataset]:
     """Group of such a kind, from the stored rows of its stages."""
-    group, found = group_of(kind), [row for stage in kind.stages for row in rows(stage, study, folder)]
+    group, found = group_of(kind), [row for stage in kind.stages for row in plan.rows(stage, study, folder)]
     names = {name for row in found for name in row} if kind.sparse else None
     return {group.name: group.of_rows(study.axes, found, names).assign_attrs(kind.attributes(study.parts[kind.name]))}
 

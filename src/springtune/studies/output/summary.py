@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from springtune.safe_io.texts import aligned, clock
 
-from ..runs.plan import Job
-from ..runs.rerun import DATASET, PAGE, PAPER_FILE, SUMMARY
+from ..runs.plan import DATASET, PAGE, PAPER_FILE, SUMMARY, Job
 from ..runs.source import RECORDS, read_note
 from .text import NOT_ALL_SOLVED
 

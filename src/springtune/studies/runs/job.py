@@ -43,9 +43,9 @@ def _plan(study: str, folder: Path) -> None:
     """Write the notes of all jobs of a study."""
     from ..config.expand import load
     from ..config.kind import kinds  # here: a run has written them
-    from .plan import plan
+    from .plan import stage_jobs
 
-    for job in plan(load(study, kinds()), folder).values():
+    for job in stage_jobs(load(study, kinds()), folder).values():
         job.write()
 
 

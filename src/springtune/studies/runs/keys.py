@@ -120,7 +120,7 @@ def full_name(module: str) -> str:
 def _files(name: str) -> Iterator[Path]:
     """File of a module of this package, and the table, the style and the templates of its name."""
     path = PACKAGE.parent.joinpath(*name.split("."))
-    yield path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    yield module if (module := path.with_suffix(".py")).is_file() else path / "__init__.py"
     yield from (table for ending in (".csv", ".mplstyle") if (table := path.with_suffix(ending)).is_file())
     yield from (path.parent / "templates").glob(f"{path.name}.*.jinja")
 
