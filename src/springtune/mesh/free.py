@@ -2,8 +2,9 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,9 +111,17 @@ class _Stretch:
     inner: int
     outer: int
 
-    def cut(self, parameters: Sequence[float]) -> list["_Stretch"]:
+    def cut(self, parameters: Iterable[float]) -> list["_Stretch"]:
         """Stretches between parameters, of which the first and the last are its ends."""
-        return [replace(self, low=low, high=high) for low, high in zip(parameters, parameters[1:])]
+        return [replace(self, low=low, high=high) for low, high in pairwise(parameters)]
+
+    def divided(self, count: int) -> list["_Stretch"]:
+        """Stretches of equal length."""
+        return self.cut(self.side.divided(count, self.low, self.high))
+
+    def parameter(self, share: float) -> float:
+        """Parameter of its side at a share of it."""
+        return self.low + share * (self.high - self.low)
 
 
 def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
@@ -122,22 +131,16 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
         raise MeshError(f"{what}: its mesh is that of the file {shape.file}; read it with springtune.read_shape")
     sizes = _sizes(shape, size, dict(refined or {}), what)
     stretches, lines, fine = _divide_sides(shape, sizes)
-    (left, low), _ = shape.extent
-    origin = np.array([left, low])
-    regions = [one.inner for one in shape.rounds]
     for _ in range(MOST_ROUNDS):
-        made, chains, divided = _netgen(stretches, lines, fine, sizes, regions, origin, what)
+        made, chains, divided = _netgen(shape, stretches, lines, fine, sizes)
         if not any(stretches[number].side.arc for number in divided):
-            break
+            return _group_mesh(shape, made, chains, stretches)
         again: list[_Stretch] = []
-        for number, stretch in enumerate(stretches):
-            shares = divided.get(number, []) if stretch.side.arc else []
-            cuts = [stretch.low + share * (stretch.high - stretch.low) for share in (0.0, *shares)] + [stretch.high]
-            again += stretch.cut(cuts)
+        for number, one in enumerate(stretches):
+            shares = divided.get(number, []) if one.side.arc else []
+            again += one.cut([*map(one.parameter, (0.0, *shares)), one.high])
         stretches = again
-    else:
-        raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
-    return _group_mesh(shape, made, chains, stretches, regions)
+    raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
 
 
 def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -> dict[str, float]:
@@ -166,8 +169,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
     for name, value in refined.items():
         part = sum(one.area for one in shape.rounds if one.inner == name)
         count += part / (ROW_HEIGHT * value**2) + 4 * lengths.get(name, value) / value
-    refusal = too_many(count, min([size, *refined.values()]), smaller, what)
-    if refusal:
+    if refusal := too_many(count, min([size, *refined.values()]), smaller, what):
         raise MeshError(f"mesh size: {size!r}{f' with {refined}' if refined else ''} {refusal}")
     return {"": size, **refined}
 
@@ -195,21 +197,16 @@ def _divide_sides(
                     cuts.add(parameter)
                     place = side.at(parameter)
                     fine[place] = min(sizes.get(name, size), fine.get(place, size))
-            places = sorted(cuts)
-            for begin, end in zip(places, places[1:]):
+            for begin, end in pairwise(sorted(cuts)):
                 # A hair less: a side of exactly n edges shall not be split into n + 1 by rounding.
                 count = math.ceil((side.length_to(end) - side.length_to(begin)) / size * (1 - 1e-9))
                 if side.arc:
                     turn = abs(side.arc[3]) * (end - begin)
                     count = max(count, math.ceil(LEAST_EDGES_A_TURN * turn / (2 * math.pi) * (1 - 1e-9)))
-                ends = side.divided(max(count, 1), begin, end)
-                stretches += _Stretch(side, begin, end, inner, outer).cut(ends)
+                stretches += _Stretch(side, begin, end, inner, outer).divided(max(count, 1))
     fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
-    return (
-        _separate_chords(stretches, shape.name),
-        _lines(shape, {point: fine[point] for point in inside.values()}),
-        fine,
-    )
+    lines = _lines(shape, {point: fine[point] for point in inside.values()})
+    return _separate_chords(stretches, shape.name), lines, fine
 
 
 def _separate_chords(stretches: list[_Stretch], name: str) -> list[_Stretch]:
@@ -223,11 +220,8 @@ def _separate_chords(stretches: list[_Stretch], name: str) -> list[_Stretch]:
         halved = {*one[aside[one] > 0].tolist(), *other[aside[other] > 0].tolist()}
         if not halved:
             return stretches
-        found = []
-        for number, stretch in enumerate(stretches):
-            ends = stretch.side.divided(2 if number in halved else 1, stretch.low, stretch.high)
-            found += stretch.cut(ends)
-        stretches = found
+        parts = (stretch.divided(2 if number in halved else 1) for number, stretch in enumerate(stretches))
+        stretches = [piece for part in parts for piece in part]
     raise MeshError(f"shape '{name}': arcs are too near to others to be meshed; keep them apart")
 
 
@@ -255,55 +249,51 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
 
 
 def _netgen(
+    shape: Outlined,
     stretches: Sequence[_Stretch],
     lines: Sequence[tuple[Point, Point, int]],
     fine: Mapping[Point, float],
     sizes: Mapping[str, float],
-    regions: Sequence[str | None],
-    origin: np.ndarray,
-    what: str,
 ) -> tuple[Triangulation, list[list[int]], dict[int, list[float]]]:
     """Triangulation inside stretches [m], the points in order along each, and shares where stretches are divided."""
     from scipy.spatial import cKDTree  # here, since studies are read without scipy
 
     # Lengths in units of the edge: netgen's own tolerances are absolute.
-    unit = sizes[""]
+    unit, origin = sizes[""], np.array(shape.extent[0])
+    what = f"shape '{shape.name}' at {unit:g} m"
     pairs = [(stretch.side.at(stretch.low), stretch.side.at(stretch.high)) for stretch in stretches]
     pairs += [(start, end) for start, end, _ in lines]
     numbers = {point: number for number, point in enumerate(dict.fromkeys(point for pair in pairs for point in pair))}
     joined = [(numbers[start], numbers[end]) for start, end in pairs]
     domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for _, _, region in lines]
+    given, parts = (np.array(list(numbers)) - origin) / unit, enumerate((one.inner for one in shape.rounds), 1)
     made = triangulate(
-        (np.array(list(numbers)) - origin) / unit,
+        given,
         [(*ends, *sides) for ends, sides in zip(joined, domains)],
-        f"{what} at {unit:g} m",
+        what,
         "give another size",
         sizes=[fine.get(point, unit) / unit for point in numbers],
-        region_sizes={
-            number: sizes[region] / unit for number, region in enumerate(regions, 1) if region and region in sizes
-        },
+        region_sizes={number: sizes[part] / unit for number, part in parts if part and part in sizes},
         maxh=EDGE_FACTOR,
         grading=GRADING,
         segmentsperedge=LINE_SIZE_SHARE,
     )
     points = made.points
-    given = (np.array(list(numbers)) - origin) / unit
     # Where two are near each other, netgen numbers them otherwise.
     away, order = cKDTree(points).query(given)
     if not len(made.triangles) or away.max() > 1e-9 * np.abs(given).max() or len(np.unique(order)) < len(order):
-        raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: points are too near each other; give another size")
-    pieces: dict[int, list[tuple[int, int]]] = defaultdict(list)
+        raise MeshError(f"netgen cannot mesh {what}: points are too near each other; give another size")
+    pieces: dict[int, dict[int, int]] = defaultdict(dict)
     for line, first, second in made.pieces:
-        pieces[line].append((first, second))
-    chains, divided = [], {}
-    corner = dict(zip(numbers.values(), order.tolist()))
+        pieces[line][first] = second
+    chains, divided, corner = [], {}, order.tolist()
     for number in range(len(stretches)):
-        following = dict(pieces[number])
+        following = pieces[number]
         chain = [corner[joined[number][0]]]
         while chain[-1] in following and len(chain) <= len(following):
             chain.append(following[chain[-1]])
         if chain[-1] != corner[joined[number][1]] or len(chain) != len(following) + 1:
-            raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: a side is not closed; give another size")
+            raise MeshError(f"netgen cannot mesh {what}: a side is not closed; give another size")
         chains.append(chain)
         if len(chain) > 2:
             start, along = points[chain[0]], points[chain[-1]] - points[chain[0]]
@@ -311,36 +301,29 @@ def _netgen(
     placed = points * unit + origin
     placed[order] = list(numbers)
     for number, shares in divided.items():
-        stretch = stretches[number]
         for i, share in zip(chains[number][1:], shares):
-            placed[i] = stretch.side.at(stretch.low + share * (stretch.high - stretch.low))
+            placed[i] = stretches[number].side.at(stretches[number].parameter(share))
     return made._replace(points=placed), chains, divided
 
 
 def _group_mesh(
-    shape: Outlined,
-    made: Triangulation,
-    chains: list[list[int]],
-    stretches: Sequence[_Stretch],
-    regions: Sequence[str | None],
+    shape: Outlined, made: Triangulation, chains: list[list[int]], stretches: Sequence[_Stretch]
 ) -> GroupedMesh:
     """A mesh with the groups of its shape, refused where triangles do not fill the outline."""
-    areas = signed_areas(made.points, made.triangles)
     # About a corner: coordinates far from the origin would cost digits.
-    ends = made.points[[pair for chain in chains for pair in zip(chain, chain[1:])]] - made.points[0]
+    ends = made.points[[pair for one in chains for pair in pairwise(one)]] - made.points[0]
     senses = [bool(one.inner) - bool(one.outer) for one, chain in zip(stretches, chains) for _ in chain[1:]]
     within = 0.5 * float((ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 1, 0] * ends[:, 0, 1]) @ senses)
-    if abs(np.abs(areas).sum() - within) > 1e-9 * within:
+    if abs(np.abs(signed_areas(made.points, made.triangles)).sum() - within) > 1e-9 * within:
         raise MeshError(f"netgen does not fill shape '{shape.name}'; give another size")
     sides: dict[str, list[Any]] = defaultdict(list)
-    for stretch, chain in zip(stretches, chains):
+    for stretch, points in zip(stretches, chains):
         if stretch.side.group:
-            pairs = list(zip(chain, chain[1:]))
-            sides[stretch.side.group] += pairs if stretch.inner else [pair[::-1] for pair in pairs]
+            sides[stretch.side.group] += [pair if stretch.inner else pair[::-1] for pair in pairwise(points)]
     parts: dict[str, np.ndarray] = {}
-    for number, region in enumerate(regions):
-        if region:
-            parts[region] = parts.get(region, False) | (made.regions == number + 1)
+    for number, one in enumerate(shape.rounds, 1):
+        if one.inner:
+            parts[one.inner] = parts.get(one.inner, False) | (made.regions == number)
     return GroupedMesh(
         Mesh(made.points, made.triangles),
         {name: np.array(edges, dtype=np.int64) for name, edges in sides.items()},
