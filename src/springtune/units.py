@@ -3,8 +3,10 @@
 A table has the usual units; pint has all others, but its import would cost every start a third of a second.
 """
 
+import math
 import re
 import unicodedata
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
@@ -64,6 +66,7 @@ _KNOWN = {
 _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?:/([0-9]+))?\s*(.*)", re.DOTALL)
 
 
+_POWERS = str.maketrans({"²": "^2", "³": "^3"})
 _OF_PRINT = re.compile("pixel|point|pica|didot|cicero|dot")
 
 LONGEST_QUANTITY = 100
@@ -104,7 +107,8 @@ def parse(text: str, dimension: str) -> float:
     number, below, unit = found.groups()
     if not unit:
         raise UnitError(f"'{text}' has no unit; {remedy}")
-    spelling = _spelling(unit)
+    # Micro and squares are written in several ways.
+    spelling = unicodedata.normalize("NFKC", unit.translate(_POWERS)).replace("μ", "u").replace("**", "^")
     known = _KNOWN.get(spelling) or _ask_pint(spelling)
     if known is None and unit[0] == ",":
         raise UnitError(f"'{text}' has a comma: write a decimal point; {remedy}")
@@ -116,20 +120,12 @@ def parse(text: str, dimension: str) -> float:
     found_dimension, size = known
     if found_dimension != dimension:
         raise UnitError(f"'{text}' is {_article(found_dimension)}; {remedy}")
-    try:
+    value = math.inf
+    with suppress(ArithmeticError):
         value = float(Decimal(number) * size / int(below or 1))
-    except ArithmeticError:
-        value = float("inf")
-    if value in (float("inf"), float("-inf")):
+    if not math.isfinite(value):
         raise UnitError(f"'{text}' is too large a number; {remedy}")
     return value
-
-
-def _spelling(unit: str) -> str:
-    """One spelling of a unit: micro and squares are written in several ways."""
-    return (
-        unicodedata.normalize("NFKC", unit.replace("²", "^2").replace("³", "^3")).replace("μ", "u").replace("**", "^")
-    )
 
 
 def _article(dimension: str) -> str:
@@ -144,14 +140,9 @@ def _registry() -> "pint.UnitRegistry[float]":
     return pint.UnitRegistry()
 
 
-def _plain(unit: str) -> bool:
-    """Return whether a unit has no nested or numeric powers: pint would evaluate ``9^9^9^9``."""
-    return not _OTHER_NUMBER.search(_POWER.sub("", unit))
-
-
 @cache
 def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
-    if not _plain(unit):
+    if _OTHER_NUMBER.search(_POWER.sub("", unit)):  # pint would evaluate 9^9^9^9
         return None
     registry = _registry()
     try:

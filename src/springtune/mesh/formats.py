@@ -211,20 +211,15 @@ def _read_vtu(raw: bytes) -> Content:
 
 def _by_meshio(found: Any) -> Content:
     """Content of what meshio read: its groups are sets, numbers in cell data, and marks of zeros and ones."""
-    try:
-        points = np.asarray(found.points, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise MeshError("coordinates that are no numbers; write the mesh again") from None
+    points = np.asarray(found.points, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
-        shape = " x ".join(map(str, points.shape))
-        raise MeshError(f"coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
+        raise ValueError(f"coordinates of points of shape {points.shape}")
     if others := [block.type for block in found.cells if block.type not in CORNER_COUNTS]:
         raise MeshError(f"has cells '{others[0]}'; {LINEAR_CELLS_REMEDY}")
     content = Content(points, [Block(block.type, np.asarray(block.data)) for block in found.cells])
     for kind, corners in content.cells:
         if len(corners) and (corners.shape[1:] != (CORNER_COUNTS[kind],) or corners.dtype.kind not in "iu"):
-            shape = f"numbers {corners.dtype} of shape {corners.shape}"
-            raise MeshError(f"cells '{kind}' by {shape}; write the mesh again")
+            raise ValueError(f"cells '{kind}' by numbers {corners.dtype} of shape {corners.shape}")
     starts = content.starts()
     # Names with a colon are notes of a format, as of MED.
     content.cell_groups.update({name: [] for name in found.field_data if ":" not in name})

@@ -296,12 +296,6 @@ def polygon(sides: tuple[OutlineSide, ...]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(numbers)
 
 
-def _closing_edges(count: int, first: int = 0) -> np.ndarray:
-    """Edges (count, 2) of a polygon of so many points, numbered from the first on."""
-    numbers = np.arange(count)
-    return first + np.stack([numbers, np.roll(numbers, -1)], axis=1)
-
-
 def winds_about(sides: tuple[OutlineSide, ...], point: Point) -> bool:
     """Return whether a round winds about a point that is not on it."""
     points, _ = polygon(sides)
@@ -315,7 +309,8 @@ def find_meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, 
     size = max(math.dist(*extent(sides)) for sides in rounds)
     for which, sides in enumerate(rounds):
         corners, numbers = polygon(sides)
-        edges.append(_closing_edges(len(corners), len(names)))
+        order = len(names) + np.arange(len(corners))
+        edges.append(np.stack([order, np.roll(order, -1)], axis=1))
         points.append(corners)
         names += [(which, number) for number in numbers.tolist()]
         errors = [0.0 if side.arc is None else CHORD_ERROR * math.dist(*extent(sides)) for side in sides]

@@ -358,9 +358,7 @@ class AnisotropicMaterial:
         shear = positive(shear_modulus, "stress", "shear_modulus")
         turn = quantity(angle, "angle", "angle")
         bound = math.sqrt(along / across)
-        if isinstance(poisson_ratio_xy, bool) or not (
-            isinstance(poisson_ratio_xy, Real) and abs(poisson_ratio_xy) < bound
-        ):
+        if not (isinstance(poisson_ratio_xy, Real) and abs(poisson_ratio_xy) < bound):
             given = f"material {name!r}: poisson_ratio_xy is {poisson_ratio_xy!r}, and its size must be below"
             root = f"sqrt(young_modulus_x / young_modulus_y) = {bound:.6g}"
             raise ValueError(f"{given} {root}; give the ratio for a pull along the fibres")

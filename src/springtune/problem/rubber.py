@@ -112,28 +112,12 @@ def read_test(test: TensileTest | str | Path) -> TensileTest:
 
 def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
     """Return coefficients of stress `columns` (n, n_terms) by least squares of relative errors."""
-    weights = relative_weights(test)
+    size = np.abs(test.stress)
+    weights = 1 / np.maximum(size, LEAST_STRESS_SHARE * size.max())
     scaled = columns * weights[:, None]
     sizes = np.linalg.norm(scaled, axis=0)
     found = np.linalg.lstsq(scaled / sizes, test.stress * weights, rcond=None)[0] / sizes
     return tuple(float(f"{one:.{FIT_DIGITS}g}") for one in found)
-
-
-def relative_weights(test: TensileTest) -> np.ndarray:
-    """Return weights that make errors of a test's stresses relative [1/Pa], shape (n,)."""
-    size = np.abs(test.stress)
-    return np.asarray(1 / np.maximum(size, LEAST_STRESS_SHARE * size.max()))
-
-
-def stress_columns(stretch: np.ndarray, terms: int) -> np.ndarray:
-    """Return uniaxial stresses at stretches (n,) for a coefficient of 1 Pa of each term, shape (n, terms)."""
-    slopes = [n * Rubber.excess("uniaxial", stretch) ** (n - 1) for n in range(1, terms + 1)]
-    return np.stack([2 * (stretch - stretch**-2) * slope for slope in slopes], axis=1)
-
-
-def relative_error(stress: np.ndarray, test: TensileTest) -> float:
-    """Root mean square of the relative errors of a law's stresses at the stretches of a test [1], to six digits."""
-    return float(f"{np.sqrt(((stress / test.stress - 1) ** 2).mean()):.6g}")
 
 
 def check_terms(terms: object, most: int) -> None:
@@ -198,15 +182,18 @@ def fit_rubber(
     """
     test = read_test(uniaxial)
     check_terms(terms, MOST_TERMS)
-    found = fit(stress_columns(test.stretch, terms), test)
+    stretch, excess = test.stretch, Rubber.excess("uniaxial", test.stretch)
+    slopes = [n * excess ** (n - 1) for n in range(1, terms + 1)]  # of a coefficient of 1 Pa
+    found = fit(np.stack([2 * (stretch - stretch**-2) * slope for slope in slopes], axis=1), test)
     if not found[0] > 0:
         raise TestDataError(f"{test.name}: fits a modulus that is not above zero; give points of small stretches, too")
-    law = Rubber(found, float(f"{Rubber.excess('uniaxial', test.stretch).max():.{FIT_DIGITS}g}"), (), density, name)
+    law = Rubber(found, float(f"{excess.max():.{FIT_DIGITS}g}"), (), density, name)
     _check(law, test.name)
     others = {"equibiaxial": equibiaxial, "pure shear": pure_shear}
     data = {"uniaxial": test} | {kind: read_test(other) for kind, other in others.items() if other is not None}
-    errors = tuple((kind, relative_error(law.stress(kind, one.stretch), one)) for kind, one in data.items())
-    return replace(law, test_errors=errors)
+    errors = {kind: law.stress(kind, one.stretch) / one.stress - 1 for kind, one in data.items()}
+    squares = {kind: np.sqrt((error**2).mean()) for kind, error in errors.items()}
+    return replace(law, test_errors=tuple((kind, float(f"{one:.6g}")) for kind, one in squares.items()))
 
 
 def _check(law: Rubber, name: str) -> None:

@@ -50,18 +50,15 @@ def why_unreadable(path: str | Path) -> str:
 
 def read(path: str | Path, most: int) -> bytes:
     """Return the content of a regular file of at most so many bytes."""
-    why = why_unreadable(path)
-    if not why:
-        try:
-            with open(path, "rb") as file:
-                found = file.read(most + 1)
-        except OSError as error:
-            why = error.strerror or str(error)
-        else:
-            if len(found) > most:
-                raise BeyondSize(f"larger than {most / 1e6:g} MB")
-    if why:
+    if why := why_unreadable(path):
         raise ValueError(why)
+    try:
+        with open(path, "rb") as file:
+            found = file.read(most + 1)
+    except OSError as error:
+        raise ValueError(error.strerror or str(error)) from None
+    if len(found) > most:
+        raise BeyondSize(f"larger than {most / 1e6:g} MB")
     return found
 
 
