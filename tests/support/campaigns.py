@@ -9,8 +9,7 @@ import xarray as xr
 import springtune as st
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.kind import mesh_key, stem
-from springtune.studies.output import present, reading
-from springtune.studies.output.browse import page as browse
+from springtune.studies.output import browse, present, reading
 from springtune.studies.runs import attempts, job, keys, plan
 
 TIMES = re.compile("seconds|created|history|git_")
