@@ -36,11 +36,11 @@ ANOTHER = "take another definition, or give each a grid of its own"
 
 
 def check_known(
-    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str | None = ""
+    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str | None
 ) -> None:
-    """Check that a name is known; `section` may declare it, by default that of its kind, or none (None)."""
+    """Check that a name is known; a `section` may declare it."""
     if name not in names:
-        declared = "" if section is None else f"; or declare it under {section or f'{what}s'}"
+        declared = f"; or declare it under {section}" if section else ""
         problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}{declared}")
 
 
@@ -48,11 +48,8 @@ def check_beam_material(problems: Problems, path: Sequence[Key], name: str, conf
     """Check that a beam material is isotropic."""
     given = config.materials[name]
     if given.young_modulus is None and given.uniaxial_test is None:
-        problems.add(
-            path,
-            f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are; put the sheet "
-            "under 'shapes', whose references take any material",
-        )
+        why = f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are"
+        problems.add(path, f"{why}; put the sheet under 'shapes', whose references take any material")
 
 
 def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
@@ -69,11 +66,6 @@ def check_scene(
     check_density(config, scene.material, (*path, "material"), problems)
     if not able(scene.load):
         problems.add((*path, "load"), f"'{scene.load}' {why}; choose of {', '.join(filter(able, LOADS))}")
-
-
-def mesh_type_names(config: StudyConfig) -> list[str]:
-    """Names of all mesh types, generated ones first."""
-    return [*MESH_TYPES, *(config.mesh_files or ())]
 
 
 def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
@@ -97,8 +89,8 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
         if isinstance(grid.force, dict):
             for owner in dict.fromkeys(getattr(grid, grid.force_owner)):
                 if owner not in grid.force:
-                    what = f"no force for {grid.force_owner} '{owner}'; add '{owner}: <force>'"
-                    problems.add((*path, "force"), what)
+                    what = f"no force for {grid.force_owner} '{owner}'"
+                    problems.add((*path, "force"), f"{what}; add '{owner}: <force>'")
     seen = set()
     for number, row in enumerate(stated_rows(config)):
         where = ("definitions", "paper", "stiffness", number)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -109,7 +110,7 @@ def _ranks(config: StudyConfig) -> dict[str, dict[Any, int]]:
     """Rank of each label, by dimension."""
     names: dict[str, Iterable[str]] = {
         "beam": config.beams,
-        "mesh_type": checks.mesh_type_names(config),
+        "mesh_type": [*MESH_TYPES, *(config.mesh_files or ())],
         "material": config.materials,
         "load": LOADS,
         "definition": DEFINITIONS,
@@ -137,10 +138,10 @@ def _body_makers(
     @cache
     def material(name: str, young_modulus: float | None, poisson_ratio: float | None) -> Material:
         found = only_isotropic(known.materials[name], "put the sheet under 'shapes'")
-        own: dict[str, Any] = {"young_modulus": young_modulus, "poisson_ratio": poisson_ratio}
-        own = {key: value for key, value in own.items() if value is not None}
-        # Rubber keeps the moduli of its law; `check_names` refuses others.
-        return found if isinstance(found, Rubber) else replace(found, **own)
+        if isinstance(found, Rubber):  # it keeps the moduli of its law; `check_names` refuses others
+            return found
+        ratio = found.poisson_ratio if poisson_ratio is None else poisson_ratio
+        return replace(found, young_modulus=young_modulus or found.young_modulus, poisson_ratio=ratio)
 
     @cache
     def mesh(beam: Beam, mesh_type: str, size: float) -> MeshSpec | None:
@@ -190,10 +191,9 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
 
 def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Problems) -> list[CurveSpec]:
     """Curves that calibrate the scenes of the definition ``calibrated``."""
-    calibration = config.definitions.calibrated
-    if not calibration:
+    if not config.definitions.calibrated:
         return []
-    place = calibration.beam, calibration.load
+    place = config.definitions.calibrated.beam, config.definitions.calibrated.load
     there = [one for one in scenes if (one.mesh.beam.name, one.load) == place]
     calibrated = (one for one in scenes if one.definition == "calibrated")
     curves: list[CurveSpec] = []
@@ -250,14 +250,10 @@ def build(
     problems.stop()
     parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
-        problems.stop_at(
-            ("printed",),
-            f"printed cells know no {' or '.join(names)}, which grids sweep; give the sweep a study of its own, or "
-            "remove the key",
-        )
+        why = f"printed cells know no {' or '.join(names)}, which grids sweep"
+        problems.stop_at(("printed",), f"{why}; give the sweep a study of its own, or remove the key")
     made = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
-    steps = [first + (last - first) * step / (points - 1) for step in range(points)]
     calibrated = config.definitions.calibrated
     study = Study(
         title=config.title,
@@ -271,47 +267,38 @@ def build(
         materials=bodies.materials,
         parts=parts,
         grids=grids,
-        stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
+        stiffness_ratios=tuple(COEFFICIENT * (first + (last - first) * n / (points - 1)) for n in range(points)),
         stiffness_table={(row.mesh_type, row.material): row.value for row in checks.stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
-        printed=read_printed(about["printed_path"], checks.mesh_type_names(config), problems)
-        if about["printed_path"]
-        else (),
+        printed=read_printed(about["printed_path"], config, problems) if config.printed else (),
         axes=_axes(ranks, used, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
         swept=names,
         **about,
     )
-    for kind in kinds:
-        for output in (one for one in kind.outputs if one.name in study.outputs):
-            lack = output.lack(study)
-            if output.shows and not parts[kind.name]:
-                lack = f"shows {output.shows} and the study has none; add a section '{kind.name}'"
-            if lack:
-                problems.add(("outputs",), f"'{output.name}' {lack}")
+    for name, output in ((kind.name, one) for kind in kinds for one in kind.outputs if one.name in study.outputs):
+        lack = output.lack(study)
+        if output.shows and not parts[name]:
+            lack = f"shows {output.shows} and the study has none; add a section '{name}'"
+        if lack:
+            problems.add(("outputs",), f"'{output.name}' {lack}")
     problems.stop()
     return study
 
 
 def _axes(
-    ranks: Mapping[str, Iterable[str]],
-    used: dict[str, set[Any]],
+    ranks: Mapping[str, Mapping[Any, int]],
+    used: Mapping[str, set[Any]],
     names: Iterable[str],
-    further: Iterable[Mapping[str, Collection[str | float]]],
+    further: Sequence[Mapping[str, Collection[str | float]]],
 ) -> dict[str, tuple[str | float, ...]]:
     """Labels of each dimension; groups share those of the root."""
-    used, own = dict(used), {}
     # A study kind may have labels that no beam has, such as loads of its own.
-    order: dict[str, dict[str | float, None]] = {name: dict.fromkeys(labels) for name, labels in ranks.items()}
-    for labels in further:
-        for name, values in labels.items():
-            if name in used:
-                used[name] = used[name] | set(values)
-                if name in order:
-                    order[name] |= dict.fromkeys(values)
-            else:
-                own[name] = values
-    axes = {name: tuple(label for label in labels if label in used[name]) for name, labels in order.items()}
-    return axes | {name: tuple(sorted(used[name])) for name in ("mesh_size", *names)} | own
+    more = {name: [*chain.from_iterable(labels.get(name, ()) for labels in further)] for name in used}
+    found = {name: {*labels, *more[name]} for name, labels in used.items()}
+    own = {name: values for labels in further for name, values in labels.items() if name not in used}
+    order = {name: dict.fromkeys([*labels, *more[name]]) for name, labels in ranks.items()}
+    axes = {name: tuple(label for label in labels if label in found[name]) for name, labels in order.items()}
+    return axes | {name: tuple(sorted(found[name])) for name in ("mesh_size", *names)} | own
 
 
 # -- CSV files ---------------------------------------------------------------------------------------------------------
@@ -350,8 +337,7 @@ def add_rows(content: Any, problems: Problems, files: list[str]) -> None:
         for place, cell in enumerate(head):
             key, _, unit = (part.strip(" ]") for part in cell.partition("["))
             if key not in GRID_PARAMETERS:
-                message = f"unknown column {show(cell)}; {nearest(key, GRID_PARAMETERS)}"
-                problems.add((*where, "rows"), message)
+                problems.add((*where, "rows"), f"unknown column {show(cell)}; {nearest(key, GRID_PARAMETERS)}")
             if key in columns or grid.get(key) is not None:
                 problems.add((*where, key), f"'{file}' has a column '{key}', too; remove one of them")
             columns[key] = [f"{row[place].strip()} {unit}".strip() for _, row in rows]
@@ -385,18 +371,15 @@ class PrintedCell(Section):
     remark: str
 
 
-def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> tuple[PrintedCell, ...]:
+def read_printed(path: Path, config: StudyConfig, problems: Problems) -> tuple[PrintedCell, ...]:
     """Read printed cells from CSV; lines that start with # are comments."""
     columns = ",".join(field.alias or name for name, field in PrintedCell.model_fields.items())
     (_, head), *rows = _table(path, ("printed",), problems, f"the head {columns} and a line for each cell")
     own = Problems(str(path))
     cells: dict[tuple[Any, ...], tuple[int, PrintedCell]] = {}
+    known = {"mesh_files": config.mesh_files or (), "beams": None, "materials": None}  # print may have others
     for line, row in rows:
-        cell = validated(PrintedCell, dict(zip(head, row)), own, line)
-        if cell.mesh_type not in mesh_types:
-            own.add(
-                ("mesh_type",), f"unknown mesh type '{cell.mesh_type}'; {nearest(cell.mesh_type, mesh_types)}", line
-            )
+        cell = validated(PrintedCell, dict(zip(head, row)), own, line, known)
         first, _ = cells.setdefault((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load), (line, cell))
         if first != line:
             own.add((), f"is the cell of line {first} again; remove one", line)

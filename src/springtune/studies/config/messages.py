@@ -74,19 +74,18 @@ class Problems:
         """Return whether no problem was added."""
         return not self._found
 
-    def stop_at(self, path: Iterable[Key], message: str) -> None:
+    def stop_at(self, path: Iterable[Key], message: str, line: int = 0) -> None:
         """Add a problem, and raise."""
-        self.add(path, message)
+        self.add(path, message, line)
         self.stop()
 
     def stop(self) -> None:
         """Raise if a problem was added."""
-        if not self._found:
-            return
         messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
         more = len(messages) - SHOWN_PROBLEMS
         messages[SHOWN_PROBLEMS:] = [f"... and {more} more"] if more > 0 else []
-        raise StudyError(*messages)
+        if messages:
+            raise StudyError(*messages)
 
 
 def refuse(message: str, *path: Key) -> PydanticCustomError:
@@ -102,11 +101,8 @@ def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
     """
     found: list[Key] = []
     for step in path:
-        if (
-            step in content
-            if isinstance(content, dict)
-            else isinstance(content, list | tuple) and isinstance(step, int)
-        ):
+        is_item = isinstance(content, list | tuple) and isinstance(step, int)
+        if is_item or isinstance(content, dict) and step in content:
             found.append(step)
             content = content[step]
     return tuple(found), content
@@ -211,14 +207,13 @@ def validated(
             if details["type"] == "study":
                 path += details["ctx"]["path"] if isinstance(value, list | dict) else ()
                 message = details["ctx"]["message"].replace("{value}", show(part_of(content, path)[1]))
-            elif details["type"] != "missing":
-                message = _message(model, details, path, value)
-            elif details["loc"][:-1] not in faulty:
-                faulty.add(details["loc"][:-1])
-                path += details["loc"][-1:] if isinstance(value, dict) else ()
-                message = _message(model, details, path, value)
             else:
-                continue
+                if details["type"] == "missing":
+                    if details["loc"][:-1] in faulty:
+                        continue
+                    faulty.add(details["loc"][:-1])
+                    path += details["loc"][-1:] if isinstance(value, dict) else ()
+                message = _message(model, details, path, value)
             problems.add(path, message, line)
         problems.stop()
         raise
@@ -258,13 +253,9 @@ def read_study(path: str | Path) -> tuple[str, Any, Lines]:
     example = "give the path of a study; `springtune new` writes one"
     try:
         found = read(path, LARGEST_STUDY)
-    except BeyondSize:
-        most = f"{LARGEST_STUDY // 1000} kB"
-        raise StudyError(
-            f"{path}: larger than {most}, which no study is; {example}, or split it into several"
-        ) from None
     except ValueError as error:
-        raise StudyError(f"{path}: cannot be read: {error}; {example}") from None
+        remedy = ", or split it into several" if isinstance(error, BeyondSize) else ""
+        raise StudyError(f"{path}: cannot be read: {error}; {example}{remedy}") from None
     try:
         text = found.decode()
     except UnicodeDecodeError as error:
@@ -295,8 +286,7 @@ def read_yaml(text: str, file: str) -> tuple[Any, Lines]:
         line = f":{mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "unreadable"
         remedy = "check colons, brackets and indentation of this line and the one above"
-        lines_of_text = text.splitlines()
-        if mark and mark.line < len(lines_of_text) and "\t" in lines_of_text[mark.line]:
+        if mark and "\t" in "".join(text.splitlines()[mark.line : mark.line + 1]):
             remedy = "write spaces in place of the tab in this line"
         if isinstance(error, yaml.constructor.ConstructorError):
             remedy = "take tags (!) out, put a lone = in quotes, and give '<<' an alias such as *name"
@@ -312,22 +302,18 @@ class _Reader:
     """Content of the nodes of a YAML file, aliases expanded up to a limit."""
 
     def __init__(self, file: str) -> None:
-        self.file, self.values = file, 0
+        self.problems, self.values = Problems(file), 0
         self.lines: dict[tuple[Key, ...], int] = {}
-
-    def refuse(self, node: yaml.Node, message: str, path: tuple[Key, ...] = ()) -> None:
-        problems = Problems(self.file)
-        problems.add(path, message, node.start_mark.line + 1)
-        problems.stop()
 
     def content(self, node: yaml.Node, path: tuple[Key, ...]) -> Any:
         self.values += 1
+        line = node.start_mark.line + 1
         if self.values > MOST_VALUES:
             most = f"more than {MOST_VALUES} values, aliases (*name) as what they stand for"
-            self.refuse(node, f"{most}; give ranges of fewer values, or split the study into several")
+            self.problems.stop_at((), f"{most}; give ranges of fewer values, or split the study into several", line)
         if node.tag == "tag:yaml.org,2002:null":
             return None
-        self.lines.setdefault(path, node.start_mark.line + 1)
+        self.lines.setdefault(path, line)
         if isinstance(node, yaml.ScalarNode):
             return self.text(node, path)
         if isinstance(node, yaml.SequenceNode):
@@ -340,7 +326,7 @@ class _Reader:
             if node.start_mark.index <= key.start_mark.index < node.end_mark.index:
                 if name in own:
                     why = f"'{name}' is given twice, first in line {own[name]}; rename or remove one"
-                    self.refuse(key, why, inside)
+                    self.problems.stop_at(inside, why, line)
                 own[name] = line
             found[name] = self.content(value, inside)
             self.lines[inside] = line
@@ -350,5 +336,5 @@ class _Reader:
         """Text of a scalar in one line; the line break that ends a block is not the text's."""
         text: str = node.value.rstrip("\n") if node.style in ("|", ">") else node.value
         if why := control_character_fault(text):
-            self.refuse(node, why, path)
+            self.problems.stop_at(path, why, node.start_mark.line + 1)
         return text
