@@ -18,12 +18,10 @@ RING_STYLE = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "bl
 
 def named_approaches(data):
     """Choose approaches to name: those of `FIRST_NAMED` with an error, then the most accurate others that fit."""
-    dimensions = [name for name in data.error.dims if name != "approach"]
-    smallest = np.abs(data.error).min(dimensions)
-    order = np.argsort(smallest.values)
-    there = data.approach.values[order[np.isfinite(smallest.values[order])]].tolist()
+    smallest = np.abs(data.error).min([name for name in data.error.dims if name != "approach"]).to_series()
+    there = smallest.dropna().sort_values(kind="stable").index.tolist()
     chosen = [name for name in FIRST_NAMED if name in there]
-    return chosen + [name for name in there if name not in chosen][: len(FIRST_NAMED) - len(chosen)]
+    return list(dict.fromkeys([*chosen, *there]))[: len(FIRST_NAMED)]
 
 
 def benchmark(tree):
@@ -63,10 +61,13 @@ def plot_benchmark(data, ax=None, *, scene=None):
     >>> axes.get_xscale(), axes.get_ylabel()
     ('log', '|Error| [%]')
     """
-    case = _scene(data, scene)
+    data = group(data, "benchmark")
+    case = data.sel(choose(data.scene.notnull(), scene=scene))
     rings = unbeaten(case.assured_error.values, case.seconds.values)
     ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
-    lost = "; ".join(filter(None, (ringed, _missing_cases(case) and f"not drawn: {_missing_cases(case)}")))
+    counts = style.count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
+    missing = ", ".join(f"{count} {word}" for word, count in counts.items())
+    lost = "; ".join(filter(None, (ringed, missing and f"not drawn: {missing}")))
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 4.0))
     shown = named_approaches(case)
     for ring, approach in zip(rings, map(str, case.approach.values)):
@@ -80,8 +81,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
         panel.plot(seconds[ring], errors[ring], "o", **RING_STYLE)
     panel.set(xlabel="Run time from mesh to displacement [s]", ylabel="|Error| [%]", title=case.scene.item())
     if not shown:
-        why = _missing_cases(case) or "none was requested"
-        style.write_reason(panel, f"No approach has an error and a time: {why}.")
+        style.write_reason(panel, f"No approach has an error and a time: {missing or 'none was requested'}.")
         return panel
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
@@ -90,15 +90,3 @@ def plot_benchmark(data, ax=None, *, scene=None):
     style.plain(panel, "x", "y")
     style.add_legend(panel, [lost])
     return panel
-
-
-def _scene(data, scene):
-    """Select a scene of the group ``/benchmark``."""
-    data = group(data, "benchmark")
-    return data.sel(choose(data.scene.notnull(), scene=scene))
-
-
-def _missing_cases(case):
-    """Count the cases without numbers by status, in words; empty if all have them."""
-    counts = style.count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
-    return ", ".join(f"{count} {word}" for word, count in counts.items() if count)

@@ -79,11 +79,6 @@ class LoadedBeam:
         return LOADS[self.load].kind
 
     @property
-    def in_plane(self):
-        """Material with the constants that the beam has in its plane."""
-        return self.material.in_plane
-
-    @property
     def side(self):
         """Coordinate of the loaded side [m], axis of that coordinate, axis of the force."""
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
@@ -253,7 +248,7 @@ def triangles(scene, size, clock, degree):
     with clock("assembling"):
         element = ElementVector((ElementTriP1, ElementTriP2)[degree - 1]())
         basis = Basis(mesh, element)
-        young, nu = scene.in_plane.young_modulus, scene.in_plane.poisson_ratio
+        young, nu = scene.material.in_plane.young_modulus, scene.material.in_plane.poisson_ratio
         lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))  # in the plane
         matrix = linear_elasticity(lam, mu).assemble(basis) * scene.beam.thickness
         value, along, axis = scene.side
@@ -282,7 +277,7 @@ def tensor_mass(scene, size, clock):
     """
     mesh = _mesh(scene, size, clock)
     with clock("assembling"):
-        young, nu = scene.in_plane.young_modulus, scene.in_plane.poisson_ratio
+        young, nu = scene.material.in_plane.young_modulus, scene.material.in_plane.poisson_ratio
         lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))
         corners = mesh.points[mesh.triangles]
         opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
@@ -303,9 +298,8 @@ def tensor_mass(scene, size, clock):
         for i in range(3):
             np.add.at(of_particles, mesh.triangles[:, i], tensor(i, i))
             j, k = (i + 1) % 3, (i + 2) % 3
-            ordered = mesh.triangles[:, j] < mesh.triangles[:, k]
-            found = np.where(ordered[:, None, None], tensor(j, k), tensor(k, j))
-            np.add.at(of_edges, mesh.cell_edges[3][:, i], found)
+            ordered = (mesh.triangles[:, j] < mesh.triangles[:, k])[:, None, None]
+            np.add.at(of_edges, mesh.cell_edges[3][:, i], np.where(ordered, tensor(j, k), tensor(k, j)))
         first, second = mesh.edges.T
         moving = ~held(mesh, scene.kind)
         load = scene.force * weights(mesh, scene.kind) * moving
@@ -323,8 +317,7 @@ def tensor_mass(scene, size, clock):
         return (total * moving).ravel()
 
     with clock("solving"):
-        shape = (load.size, load.size)
-        stiffness, inverse = LinearOperator(shape, forces), diags_array(1 / diagonal.ravel())
+        stiffness, inverse = LinearOperator((load.size, load.size), forces), diags_array(1 / diagonal.ravel())
         u, left = cg(stiffness, load.ravel(), rtol=1e-8, maxiter=20 * len(load), M=inverse)
         if left:
             raise ArithmeticError("conjugate gradients did not end")
@@ -375,14 +368,14 @@ def boundary_elements(scene, size, clock):
         middle = 0.5 * (start + end)
         side = np.repeat(np.arange(4), [columns, rows, columns, rows])  # lower, right, upper, left
     with clock("assembling"):
-        nu = scene.in_plane.poisson_ratio / (1 + scene.in_plane.poisson_ratio)
-        shear = scene.in_plane.young_modulus / (2 * (1 + scene.in_plane.poisson_ratio))
+        sheet = scene.material.in_plane
+        nu = sheet.poisson_ratio / (1 + sheet.poisson_ratio)
+        shear = sheet.young_modulus / (2 * (1 + sheet.poisson_ratio))
         count = len(middle)
         u, t = np.zeros((2, count, 2, count, 2))
         places, shares = np.polynomial.legendre.leggauss(8)
         for place, share in zip(places, shares):
-            points = middle + 0.5 * place * (end - start)
-            r = points[None, :, :] - middle[:, None, :]
+            r = (middle + 0.5 * place * (end - start))[None, :, :] - middle[:, None, :]
             distance = np.linalg.norm(r, axis=2)
             np.fill_diagonal(distance, 1.0)
             r = r / distance[..., None]
@@ -423,21 +416,17 @@ def free_form(scene, size, clock):
 
     T. W. Sederberg, S. R. Parry, Computer Graphics 20(4):151, 1986.
     """
-    beam, young = scene.beam, scene.in_plane.young_modulus
-    mesh = _mesh(scene, size, clock)
+    beam, kind, mesh = scene.beam, scene.kind, _mesh(scene, size, clock)
     with clock("solving"):
-        across, axis = scene.kind.normal, scene.kind.axis
-        far, side = (beam.length, beam.height)[across], scene.kind.side_length(beam)
-        given = (far if scene.kind.direct else 4 * far**3) / (
-            young * beam.thickness * (side if scene.kind.direct else side**3)
-        )
+        slender = (beam.length, beam.height)[kind.normal] / kind.side_length(beam)
+        given = (slender if kind.direct else 4 * slender**3) / (scene.material.in_plane.young_modulus * beam.thickness)
         # Cubic: control points along the axis that carry a straight line, or a cantilever's cubic.
-        control = np.array([0, 0, 0.5, 1.0]) if not scene.kind.direct else np.linspace(0, 1, 4)
-        s = mesh.points[:, across] / mesh.points[:, across].max()
+        control = np.linspace(0, 1, 4) if kind.direct else np.array([0, 0, 0.5, 1.0])
+        s = mesh.points[:, kind.normal] / mesh.points[:, kind.normal].max()
         basis = np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=1)
         moved = np.zeros(mesh.points.shape)
-        moved[:, axis] = scene.force * given * basis @ control
-    return float(np.tensordot(moved, measured(mesh, scene.kind), axes=2)), 8
+        moved[:, kind.axis] = scene.force * given * basis @ control
+    return float(np.tensordot(moved, measured(mesh, kind), axes=2)), 8
 
 
 def calculix_cps3(scene, size, clock):
@@ -459,8 +448,7 @@ def calculix_cps8(scene, size, clock):
         shares = calculix.side_weights(points, along, value)
         load = np.zeros(points.shape)
         load[:, axis] = scene.force * shares
-        clamp = np.zeros(points.shape, dtype=bool)
-        clamp[points[:, scene.kind.normal] == 0.0] = True
+        clamp = np.repeat(points[:, [scene.kind.normal]] == 0.0, 2, axis=1)
     with clock("solving"):
         found = calculix.solve(points, elements, "CPS8", scene.material, scene.beam.thickness, load, clamp)
     moved = found[:, axis]

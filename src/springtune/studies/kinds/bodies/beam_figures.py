@@ -1,5 +1,7 @@
 """Figures of beams: sensitivity curves, deformed networks, errors, the pressed block."""
 
+from functools import partial
+
 import numpy as np
 from matplotlib.lines import Line2D
 
@@ -93,18 +95,16 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     unit, written = style.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
     known, seen = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit, set()
     for number, size in enumerate(labels_of(curves.status != 0, "mesh_size")):
-        curve = curves.sel(mesh_size=size)
-        seen |= draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
+        seen |= draw_curve(panel, curves.sel(mesh_size=size), unit, f"{1e3 * size:g} mm", style.line(number), known)
     if root is not None and int(root.get("reference_applies", 1)) == 0:
         seen.add("beyond")
     errors = 100 * abs(curves.deformation_error)
-    highest, top = float(errors.max()), LARGEST_ERROR_SHOWN
-    if errors.min("stiffness_ratio").max() >= 0.8 * LARGEST_ERROR_SHOWN:
-        top = 1.1 * highest
+    highest, large = float(errors.max()), errors.min("stiffness_ratio").max() >= 0.8 * LARGEST_ERROR_SHOWN
+    top = 1.1 * highest if large else min(LARGEST_ERROR_SHOWN, 1.1 * highest)
     panel.set(xlabel=f"Uniform spring stiffness [{written}N/m]", ylabel="|Deformation error| [%]")
-    panel.set_ylim(0, min(top, 1.1 * highest) if highest > 0 else LARGEST_ERROR_SHOWN)
-    panel.set_xlim(*((known.min(), known.max()) if len(known) else (0, 1)))
-    panel.set_title(_sensitivity_title(panel, root, selection, words))
+    panel.set(xlim=(known.min(), known.max()) if len(known) else (0, 1))
+    panel.set(ylim=(0, top if highest > 0 else LARGEST_ERROR_SHOWN))
+    panel.set(title=_sensitivity_title(panel, root, selection, words))
     printed = root.paper_stiffness.values if root is not None and "paper_stiffness" in root else np.array(np.nan)
     for value in np.unique(printed[np.isfinite(printed)]) / unit:
         if panel.get_xlim()[0] < value < panel.get_xlim()[1]:
@@ -318,9 +318,10 @@ def _panels_of(words, present):
     """Definitions of each panel by its title, at most `MOST_DEFINITIONS_IN_PANEL`."""
     asked = labels_of(present, "definition")
     parts = np.array_split(asked, -(-len(asked) // MOST_DEFINITIONS_IN_PANEL))
-    several = len(parts) > 1
-    return {f"{words}, {number} of {len(parts)}" if several else words: part.tolist()
-            for number, part in enumerate(parts, start=1)}  # fmt: skip
+    titles = (
+        [f"{words}, {number} of {len(parts)}" for number in range(1, len(parts) + 1)] if len(parts) > 1 else [words]
+    )
+    return dict(zip(titles, map(np.ndarray.tolist, parts)))
 
 
 def _draw_panels(ax, shown, draw, title, sign):
@@ -435,8 +436,7 @@ LOGARITHMIC_FROM_RATIO = 20.0
 def sweep(tree):
     """Stem, plotting function and selection of each figure of a swept parameter."""
     present = group(tree, "/").status != 0
-    names = [name for name in SWEPT if present.sizes.get(name, 1) > 1]
-    for name in names:
+    for name in (name for name in SWEPT if present.sizes.get(name, 1) > 1):
         for stem, selection in distinct(f"sweep_{name}", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
             here = present.sel(selection)
             counts = {one: _most_values(here.sel(kinematics=one), name) for one in labels_of(here, "kinematics")}
@@ -495,8 +495,7 @@ def plot_sweep(
     swept = [name for name in SWEPT if name in root.status.dims]
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
-    whole = root
-    needed = ("status", "deformation_error", "reference_applies", "beam_length", "beam_height")
+    needed = "status", "deformation_error", "reference_applies", "reference_displacement", "beam_length", "beam_height"
     root = root[[name for name in needed if name in root]]
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = _line_styles(root)
@@ -507,11 +506,8 @@ def plot_sweep(
         parts = _panels_of(here.attrs["words"], here.status != 0)
         shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
 
-    def draw(panel, here, looks):
-        return _draw_over_values(panel, here, looks, parameter)
-
-    sign = sign_of_errors(whole.sel(load=selection["load"]))
-    return _draw_panels(ax, shown, draw, title_of_errors(root, selection), sign)
+    draw = partial(_draw_over_values, parameter=parameter)
+    return _draw_panels(ax, shown, draw, title_of_errors(root, selection), sign_of_errors(root))
 
 
 def _most_values(present, parameter):
@@ -546,9 +542,8 @@ def _draw_over_values(panel, here, looks, parameter):
     x = unit * here[parameter].values
 
     def listed(numbers):
-        values = x[numbers]
-        several = f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
-        return several if len(values) > 1 else f"{values[0]:.4g}"
+        count, low, high = len(numbers), min(x[numbers]), max(x[numbers])
+        return f"{count} from {low:.4g} to {high:.4g}" if count > 1 else f"{low:.4g}"
 
     panel.set_xlabel(words)
     asked = x[(here.status != 0).any("definition").values]
@@ -631,10 +626,8 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
     words += swept_words({name: value.sel(load=load) for name, value in values.items()})
     style.add_title(figure, ", ".join(words))
-    left, right = axes[0]
-    curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
-    here, faces = at(here, values), at(faces.sel(chosen), values)
-    curves = None if curves is None else at(curves, values)
+    (left, right), here, faces = axes[0], at(here, values), at(faces.sel(chosen), values)
+    curves = at(group(data, "sensitivity").sel(chosen), values) if "sensitivity" in data.children else None
     style.add_legend(left, *_draw_errors_over_stiffness(left, curves, here))
     style.add_legend(right, *_draw_pressed_face(right, faces, here, load))
     return axes[0]

@@ -474,8 +474,7 @@ def _reference_values(result, quantity):
 def _shape_scene_rows(study, folder, answers):
     """Rows of meshes and scenes."""
     for file, scenes in bodies.shape_scenes_by_mesh(study).items():
-        labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
-        yield labels | stored.read_notes(folder / "meshes", file)
+        yield {name: getattr(scenes[0], name) for name in MESH_AXES} | stored.read_notes(folder / "meshes", file)
         keys = {one: bodies.shape_scene_task(study, one)["key"] for one in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
         for one, key in keys.items():

@@ -7,7 +7,7 @@ from springtune.safe_io.texts import no_mathematics
 
 from ...output import drawing, style
 from ...output.dataset import STATUS, cells, choose, group, labels_of
-from .outputs import DEFORMED_STEM, ERRORS_STEM, shape_figures
+from .outputs import ERRORS_STEM, shape_figures
 
 NETWORKS_IN_ROW = 3
 """Most networks side by side."""
@@ -28,10 +28,9 @@ FORCE_COLOURS = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf
 def shapes(tree):
     """Stem, plotting function and selection of each figure of shapes."""
     data = group(tree, "shapes")
-    plots = {ERRORS_STEM: plot_shape_errors, DEFORMED_STEM: plot_shape}
     for stem, selection in shape_figures(cells(data.status != 0, ("shape", "load"))).items():
-        plot = next((plots[name] for name in plots if stem.startswith(name)), plot_shapes)
-        yield stem, plot, selection
+        of_case = plot_shape_errors if stem.startswith(ERRORS_STEM) else plot_shape
+        yield stem, of_case if selection else plot_shapes, selection
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -115,16 +114,13 @@ def _points_of_line(cut, name, definition):
     seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
     counted = (line.status.values == STATUS.index("solved")) & (int(cut.reference_applies.item()) != 0)
     found = [line.particles.values, seconds, 100 * np.abs(line[against].values), counted]
-    order = np.argsort(found[0], kind="stable")
-    kept = [values[order] for values in found]
-    there = np.isfinite(kept[0]) & np.isfinite(kept[2]) & (kept[2] > 0)
-    return [values[there] for values in kept]
+    order, there = np.argsort(found[0], kind="stable"), np.isfinite(found[0] * found[2]) & (found[2] > 0)
+    return [values[order[there[order]]] for values in found]
 
 
 def _error_variable(cut, name):
     """Variable with the errors of a quantity: against the reference if there is one."""
-    there = np.isfinite(float(cut.reference_value.sel(quantity=name)))
-    return "error" if there else "expected_error"
+    return "error" if np.isfinite(float(cut.reference_value.sel(quantity=name))) else "expected_error"
 
 
 def _draw_errors(panels, cut, name, points):
@@ -234,8 +230,7 @@ def _errors_by_quantity(whole, material, kinematics):
             row = found[f"{where}: {name}"] = {}
             for definition in labels_of(cut.status != 0, "definition"):
                 particles, _, sizes, counted = _points_of_line(cut, name, definition)
-                there = len(sizes) and counted[-1] and particles[-1] == finest
-                row[definition] = sizes[-1] if there else np.nan
+                row[definition] = sizes[-1] if len(sizes) and counted[-1] and particles[-1] == finest else np.nan
             reference = 100 * abs(float(cut.reference_expected_error.sel(quantity=name)))
             row |= {REFERENCE_COLUMN: reference} if reference > 0 else {}
     return found

@@ -254,8 +254,7 @@ class QuantityConfig(Section):
     @property
     def expected_value(self) -> float | None:
         """Expected value in SI units, or None."""
-        dimension = QUANTITIES[self.kind][0]
-        return None if self.expected is None else read_quantity(self.expected, dimension, signed=True)
+        return None if self.expected is None else read_quantity(self.expected, QUANTITIES[self.kind][0], signed=True)
 
 
 class ShapeLoadConfig(Section):

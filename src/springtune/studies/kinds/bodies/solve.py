@@ -129,8 +129,7 @@ def solve_beam(beam, sheet, field, task):
     if wanted is not None and task.get("keep_fields"):
         result["reference_displacements"] = force * wanted
     if not found.converged:
-        last = {} if found.last is None else {"last_displacement": sheet.displacement(kind, found.last)}
-        return result | last
+        return result | ({} if found.last is None else {"last_displacement": sheet.displacement(kind, found.last)})
     result["displacement"] = solution.displacement
     if kind.pressed:
         result |= _pressed_face(sheet, kind, found.displacements)

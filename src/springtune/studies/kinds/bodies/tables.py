@@ -193,8 +193,7 @@ FITTING_UNITS = {"m": {"mm": 1e-3, "um": 1e-6}, "Pa": {"MPa": 1e6, "kPa": 1e3}, 
 def _in_fitting_unit(row):
     """Row of a quantity in the largest unit in which its reference, or itself, is above a tenth; the error's sign."""
     row["sign"] = sign_word(row["error_percent"], row["reference"], row.pop("kind"))
-    sizes = (abs(row[name]) for name in ("reference", "expected", "value"))
-    size = next((one for one in sizes if one > 0), 1.0)
+    size = next((abs(row[name]) for name in ("reference", "expected", "value") if abs(row[name]) > 0), 1.0)
     units = FITTING_UNITS.get(row["units"], {row["units"]: 1.0})
     unit = next((name for name, factor in units.items() if size >= 0.1 * factor), [*units][-1])
     length = 1e3 * row.pop("edge_length")

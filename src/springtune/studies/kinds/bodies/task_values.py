@@ -34,11 +34,8 @@ def geometry(shape: Shape) -> dict[str, Any]:
 
 def load(case: LoadCase) -> dict[str, Any]:
     """Values of a load case, without its name and the names of its quantities."""
-    quantities = {quantity_key(one): one for one in case.quantities}
-    plain = [
-        replace(one, name=f"q{number}", expected=None, source="")
-        for number, (_, one) in enumerate(sorted(quantities.items()))
-    ]
+    quantities = sorted({quantity_key(one): one for one in case.quantities}.items())
+    plain = (replace(one, name=f"q{number}", expected=None, source="") for number, (_, one) in enumerate(quantities))
     return asdict(replace(case, name=LOAD_NAME, quantities=tuple(plain)))
 
 

@@ -138,8 +138,7 @@ def plot_engine_curves(data, ax=None, *, scene=None):
         for number, (values, one) in enumerate(rows.groupby(names, sort=False)):
             ratio, name = 1 + one.error, cell_text(dict(zip(names, values)), {"dt": "s"})
             panel.plot(one.stiffness_factor, ratio.where(ratio > 0), label=name, **style.line(number))
-        known = 1 + case.definition_error.sel(definition=rows.definition.iloc[0])
-        panel.plot(1, known, "k+", markersize=7, zorder=4)
+        panel.plot(1, 1 + case.definition_error.sel(definition=rows.definition.iloc[0]), "k+", markersize=7, zorder=4)
         panel.set(**style.LOGARITHMIC)
         style.plain(panel, "x", "y")
         panel.axhline(1, color="0.45", linewidth=0.8, zorder=0)

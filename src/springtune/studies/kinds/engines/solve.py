@@ -28,8 +28,7 @@ def solve(task):
     try:
         found = in_engine(scene, engine.name, factor=task["stiffness_factor"], **how)
     except EngineError as error:
-        end = "absent" if isinstance(error, EngineAbsentError) else "refused"
-        return known | failed(task, str(error), end)
+        return known | failed(task, str(error), "absent" if isinstance(error, EngineAbsentError) else "refused")
     except Exception as error:  # a program of others may raise anything, and other runs go on
         if engine.program == "springtune" or isinstance(error, MemoryError):
             raise

@@ -63,10 +63,9 @@ def _draw_row(row, laid, cell, names):
     """Draw the panels of one loading and friction."""
     shape, area, elongation = row
     friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
-    first = _draw_shape(shape, laid, names)
+    style.add_note(shape, [_draw_shape(shape, laid, names)])
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
     shape.set(aspect="equal", adjustable="datalim")
-    style.add_note(shape, [first])
     known, reference = 100 * float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
     if np.isfinite(reference):
         found = ", error unknown"

@@ -64,8 +64,7 @@ def _read_results(sample, folder):
     keys = sorted({result_key(sample, load, name) for load in sample.loads for name in sample.solved})
     names = [*dict.fromkeys([*sample.drawn, "mesh_size"])]
     paths = [folder / f"{block_key(sample, *ends)}.h5" for ends in blocks(sample.design, sample.size)]
-    fields = [*names, "displacement", "status", "particles"]
-    read = [store.read(path, [DRAWN, *keys], fields) for path in paths]
+    read = [store.read(path, [DRAWN, *keys], [*names, "displacement", "status", "particles"]) for path in paths]
     found = {key: pd.concat([_frame(one[key]) for one in read], ignore_index=True) for key in (DRAWN, *keys)}
     return {name: found[DRAWN][name].values for name in names}, found
 
@@ -153,8 +152,7 @@ def _indices(sample, data):
         # A variation below the reference's own error is no variation of the networks' errors.
         known = data.reference_error_estimate.sel(load=labels["load"]).values
         least = float(np.nanmax(known, initial=0.0)) if labels["quantity"] == "deformation_error" else 0.0
-        counts = {"base_samples": there.sum(), "base_samples_without": (~there).sum()}
-        yield pd.DataFrame([labels | counts])
+        yield pd.DataFrame([labels | {"base_samples": there.sum(), "base_samples_without": (~there).sum()}])
         yield pd.DataFrame(labels | {"parameter": sample.varied} | sobol_indices(kept[0], kept[1], kept[2:], least))
 
 

@@ -276,14 +276,12 @@ def reference_box(sample):
 def reference_key(sample, kind):
     """Key of the interpolated references of a kind of load."""
     other = *REFERENCES_OF_SHAPES, "reference.finite_strain", "studies.kinds.samples.designs"
-    code = stage_key(INTERPOLATE, without=other)
-    return hash_of(kind.name, reference_box(sample), code)
+    return hash_of(kind.name, reference_box(sample), stage_key(INTERPOLATE, without=other))
 
 
 def block_key(sample, first, last):
     """Key of the parameters of some base samples; it names the file of their results."""
-    code = stage_key("studies.kinds.samples.designs")
-    return hash_of(sample.design, sample.seed, sample.drawn, first, last, code)
+    return hash_of(sample.design, sample.seed, sample.drawn, first, last, stage_key("studies.kinds.samples.designs"))
 
 
 @cache
@@ -294,8 +292,7 @@ def _code_of_networks(mesh_type, definition):
 
 def result_key(sample, load, definition):
     """Key of the scenes of a load and definition in the file of a block."""
-    solved_with = _code_of_networks(sample.mesh_type, definition)
-    return hash_of(LOADS[load].kind.name, sample.mesh_type, solved_with)
+    return hash_of(LOADS[load].kind.name, sample.mesh_type, _code_of_networks(sample.mesh_type, definition))
 
 
 def _reference_tasks(study):

@@ -116,8 +116,7 @@ def _displacement(found, pattern):
 
 def _noise(motion, size=1e-6, seed=0):
     """Random displacements of the free particles."""
-    random = np.random.default_rng(seed).standard_normal(motion.network.held.shape)
-    return size * random * ~motion.network.held
+    return size * np.random.default_rng(seed).standard_normal(motion.network.held.shape) * ~motion.network.held
 
 
 # -- steps in time -----------------------------------------------------------------------------------------------------
@@ -154,8 +153,7 @@ def measured_limit(motion, integrator, resolution=2e-3):
 
     def grows(step):
         """Return whether a run with a step amplifies noise."""
-        start = _noise(motion)
-        half = motion.run(integrator, step, GROWTH_STEPS // 2, start)
+        half = motion.run(integrator, step, GROWTH_STEPS // 2, _noise(motion))
         if half.status == "diverged":
             return True
         found = motion.run(integrator, step, GROWTH_STEPS // 2, half.displacements, half.velocities)
@@ -271,10 +269,8 @@ def _judged_row(name, **labels):
 
     try:
         yield labels, judge
-    except DefinitionError as error:
-        note(Status.FAILED, str(error))
     except (SingularError, ArithmeticError, ValueError) as error:
-        note(Status.FAILED, f"{type(error).__name__}: {error}")
+        note(Status.FAILED, f"{type(error).__name__}: {error}".removeprefix("DefinitionError: "))
 
 
 # -- meshes and numbers ------------------------------------------------------------------------------------------------
@@ -319,8 +315,7 @@ def contrast(setup):
     sure = MOST_ROUNDING_LOSS / (np.finfo(float).eps * len(setup.coarse.points))
     base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
     for ratio in AXES["stiffness_contrast"]:
-        stiffer = Springs(reference, base * np.where(soft, 1.0, ratio))
-        problem = setup.cache(setup.coarse).problem(AXIAL, stiffer)
+        problem = setup.cache(setup.coarse).problem(AXIAL, Springs(reference, base * np.where(soft, 1.0, ratio)))
         solution = problem.linear(s)
         with _judged_row("contrast", stiffness_contrast=ratio) as (row, judge):
             judge(problem, s, solution)
@@ -369,8 +364,7 @@ def sizes(setup):
     for size in AXES["scale"]:
         ratio = size / setup.mesh_sizes[-1]
         sides = {name: getattr(setup.beam, name) * ratio for name in ("length", "height", "thickness")}
-        beam = replace(setup.beam, **sides)
-        one = replace(setup, beam=beam, force=setup.force * ratio**2, mesh_sizes=(size,))
+        one = replace(setup, beam=replace(setup.beam, **sides), force=setup.force * ratio**2, mesh_sizes=(size,))
         motion = one.motion(one.coarse, linear=False)
         motion = modified(motion, mass_damping=motion.loaded_frequency)
         static = one.problem(one.coarse)[0].nonlinear(motion.load.sum()).displacements
