@@ -90,9 +90,9 @@ def elasticity(first: float, second: float) -> tuple[float, float]:
 
 def _flex(net: Net) -> dict[str, Any] | None:
     """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
-    for terms in net.energies:
-        first, second = lame(net, terms, "MuJoCo's flex")
-        young, poisson = elasticity(first, second)
-        cells = terms.cells.ravel().tolist()
-        return {"first": first, "second": second, "young": young, "poisson": poisson, "cells": cells}
-    return None
+    if not net.energies:
+        return None
+    first, second = lame(net, net.energies[0], "MuJoCo's flex")
+    young, poisson = elasticity(first, second)
+    cells = net.energies[0].cells.ravel().tolist()
+    return {"first": first, "second": second, "young": young, "poisson": poisson, "cells": cells}

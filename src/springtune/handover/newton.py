@@ -36,10 +36,8 @@ DECAY_TIMES = 12
 
 def membrane(net: Net) -> tuple[float, float]:
     """Return ``tri_ke`` and ``tri_ka`` [N/m] of all triangles; 0 where a net has springs alone."""
-    for terms in net.energies:
-        first, shear = lame(net, terms, "Newton")
-        return shear, first
-    return 0.0, 0.0
+    first, shear = lame(net, net.energies[0], "Newton") if net.energies else (0.0, 0.0)
+    return shear, first
 
 
 def membrane_energies(net: Net, reference: float) -> list[Energy]:

@@ -350,42 +350,36 @@ def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
 def comment_lines(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     """Lines of comment: definition, material, load, expected errors and step; each is one line, whatever a name has."""
     header = net.header
-    material, load, errors = header["material"], header.get("load"), header.get("expected_error")
-    constants = ""
+    material, load, others = header["material"], header.get("load"), header.get("other_materials")
+    constants = damping = ""
     if material["young_modulus"] is not None:
         constants = f"Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio {material['poisson_ratio']:g}, "
         constants += "plane strain, " if material.get("plane") == "strain" else ""
+    if simulation.frequency:
+        share = simulation.mass_damping / (2 * simulation.frequency)
+        damping = (
+            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, {share:.3g} of the critical one of the lowest "
+            f"frequency; the one that the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} "
+            "times as high."
+        )
     left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
+    errors = header["expected_error"].items() if isinstance(header.get("expected_error"), dict) else ()
+    expected = ", ".join(f"{name} {100 * error:+.2g} %" for name, error in errors if isinstance(error, float))
+    what = "Expected error of the displacement" if header.get("beam") else "Expected errors"
     lines = [
         f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",
         f"{len(net.points)} particles, {len(net.springs) - left_out} springs; m, kg, s, N.",
         f"Material '{material['name']}': {constants}density {material['density']:g} kg/m3; thickness "
         f"{header['thickness']:g} m.",
+        f"Other parts are of {', '.join(map(repr, others))}." if others else "",
+        f"{left_out} springs of no stiffness are left out." if left_out else "",
+        f"Load: {load_in_words(load)}." if load else "",
+        f"{what}, small strain: {expected}." if expected else "",
+        f"The largest stable step of explicit schemes is {simulation.largest_step:.4g} s at rest; {integrator}.",
+        damping,
+        f"No equilibrium was found: {simulation.why}." if simulation.force and simulation.why else "",
     ]
-    if header.get("other_materials"):
-        lines.append(f"Other parts are of {', '.join(map(repr, header['other_materials']))}.")
-    if left_out:
-        lines.append(f"{left_out} springs of no stiffness are left out.")
-    if load:
-        lines.append(f"Load: {load_in_words(load)}.")
-    if isinstance(errors, dict):
-        expected = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
-        if expected:
-            what = "Expected error of the displacement" if header.get("beam") else "Expected errors"
-            lines.append(f"{what}, small strain: {', '.join(expected)}.")
-    lines.append(
-        f"The largest stable step of explicit schemes is {simulation.largest_step:.4g} s at rest; {integrator}."
-    )
-    if simulation.frequency:
-        share = simulation.mass_damping / (2 * simulation.frequency)
-        lines.append(
-            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, {share:.3g} of the critical one of the lowest "
-            f"frequency; the one that the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} "
-            "times as high."
-        )
-    if simulation.force and simulation.why:
-        lines.append(f"No equilibrium was found: {simulation.why}.")
-    return [printable(line) for line in lines]
+    return [printable(line) for line in lines if line]
 
 
 def fill_template(name: str, **values: Any) -> str:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -87,10 +88,8 @@ def read(raw: bytes) -> Content | None:
         raise ValueError("it states other numbers of points or cells than it has")
     placed = places(tags, [corners for _, corners, _ in found])
     content = Content(points, [Block(kind, own) for (kind, *_), own in zip(found, placed)])
-    for name in names.values():
-        content.cell_groups[name] = []
-    starts = content.starts()
-    for (*_, own), start, stop in zip(found, starts, starts[1:]):
+    content.cell_groups |= {name: [] for name in names.values()}
+    for (*_, own), (start, stop) in zip(found, pairwise(content.starts())):
         for name in own:
             content.cell_groups[name].append(np.arange(start, stop))
     return content

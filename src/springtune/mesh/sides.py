@@ -121,16 +121,12 @@ class OutlineSide:
             large = max(first, second)
             x2, y2, u2, v2 = ((one / large) ** 2 for one in (x, y, u, v))
             determinant = x2 * v2 - u2 * y2
-            shares = (
-                [(v2 - y2) / determinant, (x2 - u2) / determinant]
-                if abs(determinant) > RADIUS_TOLERANCE
-                else [-1.0, -1.0]
-            )
-            if not min(shares) > 1e-12:
+            shares = v2 - y2, x2 - u2
+            if not (abs(determinant) > RADIUS_TOLERANCE and min(one / determinant for one in shares) > 1e-12):
                 ends = f"the ends are {1e3 * first:.9g} and {1e3 * second:.9g} mm from it"
                 why = f"{ends}, and no ellipse with axes along x and y about it goes through both"
                 raise ValueError(f"{about}: {why}; correct the centre")
-            across, along = (large / math.sqrt(share) for share in shares)
+            across, along = (large / math.sqrt(share / determinant) for share in shares)
         begin, finish = math.atan2(y / along, x / across), math.atan2(v / along, u / across)
         turn = math.remainder(finish - begin, 2 * math.pi)
         if abs(abs(turn) - math.pi) < 1e-6:
