@@ -75,6 +75,9 @@ STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lag
 NOT_COMPUTED = "not computed"
 """First words of a text in the place of a number."""
 
+TOO_MANY = f"{NOT_COMPUTED}: {{}} particles, and at most {{}} are solved for a header"
+"""Text in the place of expected errors on a large mesh."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpringNet(Tabled, Net):
@@ -309,6 +312,11 @@ def _parts(
     """Arrays and header of a net without a load."""
     mesh, (formula, source) = sheet.mesh, described(definition)
     material, *others = ({name: getattr(one, name, None) for name in MATERIAL_CONSTANTS} for one in materials)
+    if inertia is None:
+        lacking = next(one.name for one in materials if one.density is None)
+        steps: dict[str, float] | str = f"material '{lacking}' has no density"
+    else:
+        steps = stable_steps(sheet, springs, inertia, INTEGRATORS, held)
     header = {
         "made_by": f"springtune {__version__}",
         "definition": definition.name,
@@ -331,7 +339,9 @@ def _parts(
         "load": None,
         "expected_error": f"{NOT_COMPUTED}: not asked for",
         "expected_error_means": meaning(),
-        "largest_stable_step": _stable_steps(sheet, springs, materials, inertia, held),
+        "largest_stable_step": f"{NOT_COMPUTED}: {steps}"
+        if isinstance(steps, str)
+        else {name: "unlimited" if name in IMPLICIT else step for name, step in steps.items()},
         "largest_stable_step_means": STEP_MEANING,
         "units": UNITS
         | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
@@ -373,11 +383,11 @@ def _expected_errors(
 ) -> dict[str, float | str]:
     """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import USUAL_LOADS, check_loads, errors_under, reference_of
+    from ..prediction.choices import SEARCHED_PARTICLES, USUAL_LOADS, check_loads, errors_under, reference_of
 
     names = (*check_loads(USUAL_LOADS if loads is None else loads), *further)
-    if why := _too_many(sheet):
-        return dict.fromkeys(names, why)
+    if (count := len(sheet.mesh.points)) > SEARCHED_PARTICLES:
+        return dict.fromkeys(names, TOO_MANY.format(count, SEARCHED_PARTICLES))
     why = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
     errors: dict[str, float | str] = dict.fromkeys(names, why)
     for name in errors:
@@ -386,15 +396,6 @@ def _expected_errors(
             problem = BeamProblem(beam, sheet.mesh, material, name, 1.0, "linear", sheet)
             errors |= _in_words(errors_under(problem, springs, known), known)
     return errors
-
-
-def _too_many(sheet: MeshCache) -> str:
-    """Return why expected errors are not computed on so large a mesh, or an empty string."""
-    from ..prediction.choices import SEARCHED_PARTICLES
-
-    count = len(sheet.mesh.points)
-    too_many = f"{NOT_COMPUTED}: {count} particles, and at most {SEARCHED_PARTICLES} are solved for a header"
-    return too_many if count > SEARCHED_PARTICLES else ""
 
 
 def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:
@@ -410,11 +411,12 @@ def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[
 def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import QuantityReference, References, errors_under, shape_references
+    from ..prediction.choices import SEARCHED_PARTICLES, QuantityReference, References, errors_under, shape_references
     from ..reference.small_strain import ReferenceNotConvergedError
 
-    if why := _too_many(scene.sheet):
-        return dict.fromkeys([one.name for one in scene.case.quantities], why)
+    if (count := len(scene.mesh.points)) > SEARCHED_PARTICLES:
+        names = [one.name for one in scene.case.quantities]
+        return dict.fromkeys(names, TOO_MANY.format(count, SEARCHED_PARTICLES))
     linear = ShapeProblem(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.sheet)
     try:
         values = linear.reference_values()
@@ -423,20 +425,3 @@ def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
         # One quantity without a reference, such as stress at a corner, does not cost the others theirs.
         known = shape_references(linear)
     return _in_words(errors_under(linear, springs, known), known)
-
-
-def _stable_steps(
-    sheet: MeshCache,
-    springs: Springs,
-    materials: Sequence[AnyMaterial],
-    inertia: np.ndarray | None,
-    held: np.ndarray | None,
-) -> dict[str, float | str] | str:
-    """Largest stable step of each integrator, undamped [s], or "unlimited"; or why it is not computed."""
-    if inertia is None:
-        lacking = next(one.name for one in materials if one.density is None)
-        return f"{NOT_COMPUTED}: material '{lacking}' has no density"
-    steps = stable_steps(sheet, springs, inertia, INTEGRATORS, held)
-    if isinstance(steps, str):
-        return f"{NOT_COMPUTED}: {steps}"
-    return {name: "unlimited" if name in IMPLICIT else step for name, step in steps.items()}
