@@ -9,23 +9,6 @@ import numpy as np
 
 from .simulation import STEPS_PER_PERIOD, Net, comment_lines, fill_template, numbers, simulate
 
-BACKWARD_EULER = (
-    ("Sofa.Component.ODESolver.Backward", "EulerImplicitSolver"),
-    ("Sofa.Component.IntegrationScheme.Backward", "EulerImplicitIntegrationScheme"),
-)
-"""Plugin and component of backward Euler, until v25.12 and since v26.06."""
-
-PLUGINS = (
-    "Sofa.Component.Constraint.Projective",
-    "Sofa.Component.LinearSolver.Direct",
-    "Sofa.Component.Mass",
-    "Sofa.Component.MechanicalLoad",
-    "Sofa.Component.SolidMechanics.Spring",
-    "Sofa.Component.StateContainer",
-    "Sofa.Component.Topology.Container.Dynamic",
-    "Sofa.Component.Visual",
-)
-
 Component = tuple[str, dict[str, str]]
 """Name of a component, and its data."""
 
@@ -71,8 +54,6 @@ def sofa_python(net: Net) -> str:
         "sofa.py",
         about=comment_lines(net, simulation, step_note),
         step=simulation.implicit_step,
-        plugins=PLUGINS,
-        backward_euler=BACKWARD_EULER,
         integrator={"rayleighStiffness": "0", "rayleighMass": repr(simulation.mass_damping)},
         sheet=sheet,
         predicted=predicted,
