@@ -39,32 +39,24 @@ class AssumptionWarning(UserWarning):
     """An input violates an assumption of the model, such as a thin sheet."""
 
 
-def _warn(said: str) -> None:
-    """Warn whoever makes the body."""
-    warnings.warn(said, AssumptionWarning, stacklevel=5)
-
-
-def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -> None:
-    """Warn if a body is thicker than its smaller side [m]: plane stress is for thin sheets."""
-    smaller = min(sides)
-    if thickness > smaller:
-        _warn(
-            f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
-            "stress is an assumption about thin sheets; give a smaller thickness, or a material in plane strain"
-        )
-
-
 LEAST_SIDE, MOST_SIDE = 1e-5, 100.0
 """Longer sides of bodies [m] beyond which a unit is likely to be missing."""
 
 
-def warn_of_size(sides: Iterable[float], what: str) -> None:
-    """Warn if the longer side of a body [m] is so short or long that a unit is likely to be missing."""
-    longer = max(sides)
+def warn_of_body(sides: Sequence[float], thickness: float, what: str) -> None:
+    """Warn if the longer side of a body [m] is likely to lack a unit, or if it is no thin sheet, as in plane stress."""
+    smaller, longer = min(sides), max(sides)
     if not LEAST_SIDE <= longer <= MOST_SIDE:
         usual = f"more than {MOST_SIDE:g} m" if longer > MOST_SIDE else f"less than {1e6 * LEAST_SIDE:g} um"
-        units = "numbers in Python are in m, a text such as '200 mm' has its own"
-        _warn(f"{what}: its longer side is {longer:.6g} m, {usual}; check the unit: {units}")
+        remedy = "check the unit: numbers in Python are in m, a text such as '200 mm' has its own"
+        message = f"{what}: its longer side is {longer:.6g} m, {usual}; {remedy}"
+        warnings.warn(message, AssumptionWarning, stacklevel=4)
+    if thickness > smaller:
+        message = (
+            f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
+            "stress is an assumption about thin sheets; give a smaller thickness, or a material in plane strain"
+        )
+        warnings.warn(message, AssumptionWarning, stacklevel=4)
 
 
 @dataclass(frozen=True)
@@ -106,8 +98,7 @@ class Beam:
             put(self, **{side: positive(getattr(self, side), "length", side)})
         if not self.name:
             put(self, name=f"{1e3 * self.length:g}x{1e3 * self.height:g}")
-        warn_of_size((self.length, self.height), f"beam {self.name!r}")
-        warn_of_thickness(self.thickness, (self.length, self.height), f"beam {self.name!r}")
+        warn_of_body((self.length, self.height), self.thickness, f"beam {self.name!r}")
 
     @property
     def label(self) -> str:
@@ -709,8 +700,7 @@ class Shape:
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
         (left, low), (right, high) = self.extent
-        warn_of_size((right - left, high - low), what)
-        warn_of_thickness(self.thickness, (right - left, high - low), what)
+        warn_of_body((right - left, high - low), self.thickness, what)
 
     def _check_rounds(self) -> None:
         """Refuse rounds that meet each other or themselves, or are at a wrong place; turn a clockwise outline."""

@@ -26,7 +26,7 @@ from ..problem.boundary import (
 from ..problem.loads import LOADS, Load, LoadKind
 from ..problem.materials import AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
-from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_size, warn_of_thickness
+from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_body
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
 from .mesh_cache import (
@@ -280,9 +280,7 @@ class ShapeProblem(BoundaryProblem):
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)
         if shape.file:
-            sides = np.ptp(self.mesh.points, axis=0)
-            warn_of_size(sides, f"shape {shape.name!r}")
-            warn_of_thickness(shape.thickness, sides, f"shape {shape.name!r}")
+            warn_of_body(np.ptp(self.mesh.points, axis=0), shape.thickness, f"shape {shape.name!r}")
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
         self.scale, self.force = float(scale), 1.0

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAda
 
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import MOST_SCENES
-from springtune.problem.shapes import warn_of_size, warn_of_thickness
+from springtune.problem.shapes import warn_of_body
 from springtune.safe_io.texts import number_text
 from springtune.springs.base import DEFINITIONS
 
@@ -255,8 +255,7 @@ def _check_sizes(sample, problems):
 def _expand(config, declared):
     drawn = config.samples.drawn
     smallest, largest = (tuple(drawn[name][end] for name in ("length", "height")) for end in ("low", "high"))
-    warn_of_size((*smallest, *largest), "samples")
-    warn_of_thickness(drawn["thickness"]["high"], smallest, "samples")
+    warn_of_body((*smallest, *largest), drawn["thickness"]["high"], "samples")
     return config.samples
 
 
