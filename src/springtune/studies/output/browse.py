@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import h5netcdf
 import jinja2
@@ -29,24 +29,9 @@ from springtune.problem.quantities import Status
 from springtune.safe_io.files import write_json, write_text
 
 from ..config.kind import VIEWS, kind_files
-from . import reading
-from .answers import (
-    ERROR_COLOURS,
-    ERROR_RANGE,
-    Columns,
-    DefinitionErrors,
-    Variables,
-    broadcast,
-    definition_errors,
-    own_laws,
-    requested_cells,
-    sign_of_displacements,
-    what_to_type,
-)
+from . import answers, reading
+from .answers import Columns, DefinitionErrors, Variables, definition_errors, requested_cells
 from .text import label_text, range_text
-
-if TYPE_CHECKING:
-    from .dataset import Label
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
@@ -73,7 +58,7 @@ class Plot:
     log: Literal["", "x", "y", "xy"] = ""
     equal: bool = False
     beside: tuple[tuple[str, str, str], ...] = ()
-    selection: "Mapping[str, Label]" = field(default_factory=dict)
+    selection: Mapping[str, str | float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -101,19 +86,16 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
         groups = packed(file)
         parts = {group.name: _read(group, file) for group in (file, *file.groups.values()) if group.name in GROUPS}
         found = overview(parts)
-    attributes = groups[0]["attributes"]
-    declared = {path: asdict(view) for path, view in views().items()}
-    scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
-    content = {"groups": groups, "declared": declared, "scale": scale}
-    library = _library()
+    attributes, library = groups[0]["attributes"], _library()
+    scale = {"colours": answers.ERROR_COLOURS, "range": answers.ERROR_RANGE}
+    content = {"groups": groups, "declared": {path: asdict(view) for path, view in views().items()}, "scale": scale}
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in PAGE_SCRIPTS) + "})();\n"
     # Scripts run only with one of these hashes, and nothing may be loaded: a script in a title stays a text.
     hashes = " ".join(_hash(text) for text in (script, *library.values()))
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("springtune.studies.output", "assets"), autoescape=True, trim_blocks=True
-    )
+    loader = jinja2.PackageLoader("springtune.studies.output", "assets")
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
     environment.filters |= FILTERS
     return environment.get_template("page.html").render(
         title=attributes.get("title") or attributes.get("study") or "Study",
@@ -223,11 +205,11 @@ def _read(group: h5netcdf.Group, root: h5netcdf.File) -> dict[str, tuple[Sequenc
     """Dimensions and values of a group's numbers and labels, and of those labels that it shares with the root."""
     dims = {name for stored in group.variables.values() for name in stored.dimensions}
     labels = {name: root.variables[name] for name in dims if name in root.variables}
-    found = {}
-    for name, stored in (labels | dict(group.variables)).items():
-        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf" or name == REMARK:
-            found[name] = (stored.dimensions, _values(stored))
-    return found
+    return {
+        name: (stored.dimensions, _values(stored))
+        for name, stored in (labels | dict(group.variables)).items()
+        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf" or name == REMARK
+    }
 
 
 def _values(stored: h5netcdf.Variable) -> np.ndarray:
@@ -237,7 +219,7 @@ def _values(stored: h5netcdf.Variable) -> np.ndarray:
 
 
 def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
-    return broadcast(dims, stored.dimensions, stored[...])
+    return answers.broadcast(dims, stored.dimensions, stored[...])
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -269,8 +251,8 @@ def _mark_beyond_linear(own: StoredVariables, row: dict[str, Any], status: np.nd
 def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
     """Return whether an error has a sign; norms and numbers printed without one have none."""
     said = row.get("long_name", "")
-    stated = re.search(r"signed|less 1|- 1$|network - reference", said)
-    return "without sign" not in said and bool(stated or (values < 0).any())
+    stated = re.search(r"signed|less 1|- 1$|network - reference", said) is not None
+    return "without sign" not in said and (stated or bool((values < 0).any()))
 
 
 def _sign_sentence(name: str, own: StoredVariables, root: StoredVariables) -> str:
@@ -280,17 +262,16 @@ def _sign_sentence(name: str, own: StoredVariables, root: StoredVariables) -> st
     group = own if reference in own else root
     if reference not in group or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
         return "positive: too large"
-    dims, others = group[reference].dimensions, False
-    values = group[reference][...]
+    dims, others, values = group[reference].dimensions, False, group[reference][...]
     if "quantity_kind" in group:
         displacements = _broadcast(group["quantity_kind"], dims) == "displacement"
         others = bool((np.isfinite(values) & ~displacements).any())
         values = np.where(displacements, values, np.nan)
     axes = {one: _labels(one, own, root).get("labels", ()) for one in dims}
-    said = sign_of_displacements(values, axes)
-    if not others:
-        return said
-    return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
+    said = answers.sign_of_displacements(values, axes)
+    if others:
+        return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
+    return said
 
 
 # -- arrays ------------------------------------------------------------------------------------------------------------
@@ -298,10 +279,9 @@ def _sign_sentence(name: str, own: StoredVariables, root: StoredVariables) -> st
 
 def _json_value(value: Any) -> Any:
     """Convert a label or an attribute for JSON, which has no NaN."""
-    if isinstance(value, np.ndarray):
-        return [_json_value(one) for one in value.tolist()]
-    if isinstance(value, np.generic):
-        value = value.item()
+    value = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if isinstance(value, list):
+        return [_json_value(one) for one in value]
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value if isinstance(value, bool | int | float | str) else str(value)
@@ -327,13 +307,10 @@ def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[
     long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
     points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
     numbers = values.reshape(-1, points)
-    parts = []
-    row["points"] = points
+    row["points"], head = points, b""
     if long:
         kept = present.reshape(-1, points).any(axis=1)
-        row["kept"] = int(kept.sum())
-        parts.append(np.packbits(kept, bitorder="little").tobytes())
-        numbers = numbers[kept]
+        row["kept"], head, numbers = int(kept.sum()), np.packbits(kept, bitorder="little").tobytes(), numbers[kept]
     if row["type"] == "float":
         row["cleared"] = LINE_BITS_CLEARED if points > 1 else CELL_BITS_CLEARED
         numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)  # all NaN are equal
@@ -346,8 +323,7 @@ def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[
         # Integer differences wrap around, as they do in the page.
         bits = np.diff(bits, axis=1, prepend=np.int32(0))
     folded = (bits << 1) ^ (bits >> 31)
-    parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
-    return row | {"data": _compress(b"".join(parts))}
+    return row | {"data": _compress(head + folded.reshape(-1).view(np.uint8).reshape(-1, 4).T.tobytes())}
 
 
 # -- the overview that a page opens on, without a script ---------------------------------------------------------------
@@ -442,7 +418,7 @@ def overview(groups: Mapping[str, Variables]) -> Content:
         if {source.error, "status", "definition"} <= {*group}:
             finite = groups.get("/finite_strain", {}) if source.group == "/" else {}
             content = _errors(source, requested_cells(group, finite, source.error))
-            found.append(content | {"finite_strain": bool(own_laws(finite))})
+            found.append(content | {"finite_strain": bool(answers.own_laws(finite))})
     return {
         "sources": found,
         "curves": _curves({**root, **curves}) if "deformation_error" in curves else {},
@@ -456,8 +432,8 @@ def overview(groups: Mapping[str, Variables]) -> Content:
 def _errors(source: Source, cells: Columns) -> Content:
     """What to type, errors of definitions, and errors over run time."""
     found = sorted(definition_errors(cells), key=lambda one: one.median)
-    answers = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
-    content: Content = {"source": source, "answers": answers[:MOST_ANSWERS], "further": len(answers) - MOST_ANSWERS}
+    typed = [*answers.what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
+    content: Content = {"source": source, "answers": typed[:MOST_ANSWERS], "further": len(typed) - MOST_ANSWERS}
     if found:
         percents = np.maximum(100 * np.abs(cells["valid_error"]), SMALLEST_PERCENT)
         content["errors"] = _dots(found, percents, cells[source.by], cells["valid_error"])
@@ -511,10 +487,9 @@ def _times(found: Sequence[DefinitionErrors], percents: np.ndarray, sizes: np.nd
     x, y = Axis("run time [s]", np.maximum(times, SHORTEST_TIME), log=True), Axis(ERROR_AXIS, errors, log=True)
     lines, dots = [], []
     for look, (name, rows) in enumerate(medians.items()):
-        places = [(x.at(max(time, SHORTEST_TIME)), y.at(error)) for _, time, error in rows]
+        lines.append((look, [(x.at(max(time, SHORTEST_TIME)), y.at(error)) for _, time, error in rows]))
         texts = [f"{name}, {size}: {error:.2g} %, {time:.2g} s".replace(", :", ":") for size, time, error in rows]
-        lines.append((look, places))
-        dots += [(f"look{look}", *place, text) for place, text in zip(places, texts)]
+        dots += [(f"look{look}", *place, text) for place, text in zip(lines[-1][1], texts)]
     return Chart(x, y, lines=lines, dots=dots, names={name: look for look, name in enumerate(medians)})
 
 
@@ -578,11 +553,8 @@ def _paper_tables(cells: Columns) -> Content:
             "reference": f"{1e3 * cell['reference_displacement']:.3f}", "errors": {},
         })  # fmt: skip
         if cell["kinematics"] == kinematics.get(cell["definition"]):
-            solved = cell["status"] == Status.SOLVED
-            text = (
-                f"{100 * cell['deformation_error']:+.2f}" if solved else str(Status(cell["status"])).replace("_", " ")
-            )
-            row["errors"][cell["definition"]] = text
+            status, error = Status(cell["status"]), f"{100 * cell['deformation_error']:+.2f}"
+            row["errors"][cell["definition"]] = error if status == Status.SOLVED else str(status).replace("_", " ")
     return {"tables": dict(sorted(tables.items())[:MOST_PANELS]), "kinematics": kinematics}
 
 

@@ -21,18 +21,16 @@ Jobs = Mapping[str, Job]
 
 def ending(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a successful run."""
-    new, took = _count_new_results(jobs, since), clock(time.time() - since)
-    rows = [["new", new], ["took", took], ["results", _result_paths(_folder(jobs))]]
-    return f"\n{_stored_summary(study, jobs)}\n{aligned(rows, 0)}\n"
+    took, results = clock(time.time() - since), _result_paths(_folder(jobs))
+    told = aligned([["new", _count_new_results(jobs, since)], ["took", took], ["results", results]], 0)
+    return f"\n{_stored_summary(study, jobs)}\n{told}\n"
 
 
 def broken(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a failed run."""
-    lines = [f"{study.name} is not complete: a job failed or was stopped."]
-    for path in _failed_logs(jobs, since):
-        lines += [f"  {_last_line(path)}", f"    its log: {path}"]
-    lines += ["What is computed is kept: the same command takes up where this one stopped."]
-    return "\n" + "\n".join(lines) + "\n"
+    logs = "".join(f"  {_last_line(path)}\n    its log: {path}\n" for path in _failed_logs(jobs, since))
+    kept = "What is computed is kept: the same command takes up where this one stopped."
+    return f"\n{study.name} is not complete: a job failed or was stopped.\n{logs}{kept}\n"
 
 
 def beside(study: "Study", jobs: Jobs, since: float) -> str:
@@ -55,9 +53,9 @@ def _last_line(log: Path) -> str:
 
 def _failed_logs(jobs: Jobs, since: float) -> list[Path]:
     """Logs of jobs that failed or were stopped in this run: they wrote no record."""
-    logs = sorted((_folder(jobs) / "logs").glob("*.log"))
-    records = {path: _folder(jobs) / RECORDS / f"{path.stem}.json" for path in logs}
-    return [path for path, record in records.items() if _modified(path) >= since and _modified(record) < since]
+    folder = _folder(jobs)
+    ran = [path for path in sorted((folder / "logs").glob("*.log")) if _modified(path) >= since]
+    return [path for path in ran if _modified(folder / RECORDS / f"{path.stem}.json") < since]
 
 
 def _folder(jobs: Jobs) -> Path:
@@ -105,9 +103,6 @@ def _count_new_results(jobs: Jobs, since: float) -> str:
 
 def _result_paths(folder: Path) -> str:
     """Existing results, most useful first."""
-    files = (PAPER_FILE, PAGE, DATASET, "tables/index.html")
-    names = [name for name in files if (folder / name).exists()]
-    names += [f"{name}/" for name in ("figures", "tables", "paraview", "meshes") if (folder / name).is_dir()]
-    if "tables/index.html" in names:
-        names.remove("tables/")
-    return f"{folder}: {', '.join(names)}"
+    tables = "tables/index.html" if (folder / "tables/index.html").exists() else "tables/"
+    names = (PAPER_FILE, PAGE, DATASET, tables, "figures/", "paraview/", "meshes/")
+    return f"{folder}: {', '.join(name for name in names if (folder / name).exists())}"

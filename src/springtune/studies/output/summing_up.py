@@ -1,7 +1,7 @@
 """Dataset as text, for `collect` and `info`: solved cells, failures with reasons, errors, groups, origin."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from html import escape
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from springtune.safe_io.texts import aligned, shown
 
 from . import reading
 from .answers import Columns, Variables, definition_errors, own_laws, requested_cells, what_to_type
+from .dataset import variables
 from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, place_text, range_text, without_numbers
 
 CELLS_NAMED = 3
@@ -39,7 +40,11 @@ COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "
 def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
     """Summarise a study's cells, with the errors of at most so many definitions."""
     states = [state for name, data in groups.items() for state in _states(name, data)]
-    rows = [[what, str(sum(found.values())), _count_words(found)] for what, found, _ in states if found]
+    rows = [
+        [what, str(sum(found.values())), ", ".join(f"{number} {_words(status)}" for status, number in found.items())]
+        for what, found, _ in states
+        if found
+    ]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
     for name, data in groups.items():
         if name.strip("/") in COMPARED:
@@ -48,19 +53,14 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
-    holes = [(what, found, lost) for what, found, lost in states if lost]
-    for what, found, lost in holes:
+    holes = []
+    for what, found, lost in states:
+        count = sum(found.values())
         for status, cells in lost.items():
-            lines += [
-                "",
-                f"{what}, {_status_words(status)}: {len(cells)} of {sum(found.values())}",
-                *_cell_lines(cells),
-            ]
+            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {count}", *_cell_lines(cells)]
+        holes += [f"{sum(map(len, lost.values()))} of {count} {what}"] if lost else []
     if holes:
-        told = "; ".join(
-            f"{sum(map(len, lost.values()))} of {sum(found.values())} {what}" for what, found, lost in holes
-        )
-        lines += ["", f"{NOT_ALL_SOLVED}: {told}. dataset.nc names each, and why: `status`, `message`."]
+        lines += ["", f"{NOT_ALL_SOLVED}: {'; '.join(holes)}. dataset.nc names each, and why: `status`, `message`."]
     return "\n".join(lines) + "\n"
 
 
@@ -74,27 +74,23 @@ def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, dict[Status, int
         message = label.removesuffix("status") + "message"
         if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
             continue
-        flags = variable.values
+        flags, messages = variable.values, data[message].values
         found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
-        lost: dict[Status, Cells] = {
-            status: [
-                (place_text(data, variable.dims, place), str(data[message].values[tuple(place)]))
-                for place in np.argwhere(flags == status)
-            ]
-            for status, number in found.items()
-            if number and status != Status.SOLVED
-        }
+        found = {status: number for status, number in found.items() if number}
+        holes = [status for status in found if status != Status.SOLVED]
+        lost = {status: _cells(data, variable.dims, flags == status, messages) for status in holes}
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == ROOT_GROUP else ", ".join(filter(None, (name.strip("/"), part)))
-        yield what, {status: number for status, number in found.items() if number}, lost
+        yield what, found, lost
 
 
-def _status_words(status: Status) -> str:
+def _cells(data: xr.Dataset, dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
+    """Labels and messages of cells."""
+    return [(place_text(data, dims, place), str(messages[tuple(place)])) for place in np.argwhere(there)]
+
+
+def _words(status: Status) -> str:
     return str(status).replace("_", " ")
-
-
-def _count_words(found: Mapping[Status, int]) -> str:
-    return ", ".join(f"{number} {_status_words(status)}" for status, number in found.items())
 
 
 def _cell_lines(cells: Cells) -> Iterator[str]:
@@ -103,11 +99,10 @@ def _cell_lines(cells: Cells) -> Iterator[str]:
     for cell in cells:
         reasons.setdefault(without_numbers(cell[1]), []).append(cell)
     order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
-    told = order if len(order) <= CELLS_NAMED + 1 else order[:CELLS_NAMED]
-    for labels, message in told:
-        yield f"  {shown(': '.join(filter(None, (labels, message))))}"
-    if len(told) < len(order):
-        yield f"  and {len(order) - len(told)} more"
+    named = len(order) if len(order) <= CELLS_NAMED + 1 else CELLS_NAMED
+    yield from (f"  {shown(': '.join(filter(None, cell)))}" for cell in order[:named])
+    if named < len(order):
+        yield f"  and {len(order) - named} more"
 
 
 def _answers(
@@ -115,15 +110,11 @@ def _answers(
 ) -> Iterator[str]:
     """Errors of definitions, and what to type."""
     if "definition" in data.get(error, data).dims:
-        own, other = _variables(data), None if finite is None else _variables(finite)
-        cells = requested_cells(own, other, error)
+        other = None if finite is None else variables(finite)
+        cells = requested_cells(variables(data), other, error)
         yield from _errors(cells, data[error], cells[reference], other, most)
         if error == "deformation_error":  # of shapes quantities have errors
             yield from _stiffness_to_type(cells)
-
-
-def _variables(data: xr.Dataset) -> Variables:
-    return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
 
 
 def _errors(
@@ -132,11 +123,8 @@ def _errors(
     """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
     found = sorted(definition_errors(cells), key=lambda one: -one.errors.max())
     if found:
-        yield from (
-            "",
-            f"{str(error.name).replace('_', ' ')}s, (network - reference) / |reference|, of solved scenes within the "
-            "reference",
-        )
+        what = str(error.name).replace("_", " ")
+        yield from ("", f"{what}s, (network - reference) / |reference|, of solved scenes within the reference")
         if finite is not None and own_laws(finite):
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         by = [name for name in ("definition", "kinematics") if name in cells]
@@ -181,8 +169,7 @@ def _lines_on_references(root: xr.Dataset, called: str) -> Iterator[str]:
             continue
         few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
         few = few.transpose(*root.reference_message.dims)
-        messages = root.reference_message.values
-        cells = [(place_text(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
+        cells = _cells(root, few.dims, few.values, root.reference_message.values)
         yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_cell_lines(cells))
 
 
@@ -239,20 +226,16 @@ def info_text(tree: xr.DataTree, path: Path) -> str:
 def _groups(tree: xr.DataTree) -> list[str]:
     rows = []
     for node in tree.subtree:
-        sizes = node.to_dataset().drop_vars(node.coords).sizes  # without inherited dimensions
-        counts = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        rows.append([f"  {node.path}", len(node.data_vars), counts])
+        sizes = node.to_dataset().drop_vars(node.coords).sizes.items()  # without inherited dimensions
+        rows.append([f"  {node.path}", len(node.data_vars), ", ".join(f"{name} {size}" for name, size in sizes)])
     return ["groups, their variables and dimensions", *aligned(rows, 0, (1,)).splitlines()]
 
 
 def _provenance(tree: xr.DataTree) -> list[str]:
     """Versions, commit and hashes."""
-    attributes = {str(name): str(value) for name, value in tree.attrs.items()}
-    lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
-    if attributes.get("git_commit"):
-        lines.append(f"  commit {attributes['git_commit']}")
-    software = from_json(attributes.get("software"))
-    if software:
-        lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))
-    lines += [f"  sha256 {digest}  {name}" for name, digest in from_json(attributes.get("inputs")).items()]
-    return lines
+    lines = ["made with", f"  springtune {tree.attrs.get('springtune_version', 'unknown')}"]
+    lines += [f"  commit {tree.attrs['git_commit']}"] if tree.attrs.get("git_commit") else []
+    software = from_json(tree.attrs.get("software")).items()
+    said = ", ".join(f"{name} {version}" for name, version in software if version != "none")
+    lines += [f"  {said}"] if said else []
+    return lines + [f"  sha256 {digest}  {name}" for name, digest in from_json(tree.attrs.get("inputs")).items()]
