@@ -216,12 +216,11 @@ def _separate_chords(stretches: list[_Stretch], name: str) -> list[_Stretch]:
         edges = np.array([[numbers.setdefault(one.side.at(end), len(numbers)) for end in (one.low, one.high)]
                           for one in stretches])  # fmt: skip
         aside = np.array([one.side.aside(one.low, one.high) for one in stretches])
-        one, other, _ = nearer(np.array(list(numbers)), edges, 3 * aside)
-        halved = {*one[aside[one] > 0].tolist(), *other[aside[other] > 0].tolist()}
+        near = nearer(np.array(list(numbers)), edges, 3 * aside)
+        halved = {*near[aside[near] > 0].tolist()}
         if not halved:
             return stretches
-        parts = (stretch.divided(2 if number in halved else 1) for number, stretch in enumerate(stretches))
-        stretches = [piece for part in parts for piece in part]
+        stretches = [piece for i, one in enumerate(stretches) for piece in (one.divided(2) if i in halved else [one])]
     raise MeshError(f"shape '{name}': arcs are too near to others to be meshed; keep them apart")
 
 

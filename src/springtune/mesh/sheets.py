@@ -32,7 +32,7 @@ def sheet_fault(mesh: Mesh) -> str:
     ways = np.diff(points[outline], axis=1)[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
     small = min(COORDINATE_TOLERANCE * np.ptp(points, axis=0).max(), 0.01 * lengths.min())
-    one, other, _ = nearer(points, outline, np.full(len(outline), 0.5 * small))
+    near = nearer(points, outline, np.full(len(outline), 0.5 * small)).ravel()
     # Edges that share a point touch where the outline turns back on itself there.
     order, (x, y) = np.argsort(outline[:, 0]), (ways / lengths[:, None]).T
     low, high = (np.searchsorted(outline[order, 0], outline[:, 1], side) for side in ("left", "right"))
@@ -40,7 +40,7 @@ def sheet_fault(mesh: Mesh) -> str:
     which, back = np.nonzero(
         (x * x[after] + y * y[after] < 0) & (np.abs(x * y[after] - y * x[after]) < COORDINATE_TOLERANCE)
     )
-    touching = np.unique(np.concatenate([one, other, back, after[which, back]]))
+    touching = np.unique(np.concatenate([near, back, after[which, back]]))
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
         first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"

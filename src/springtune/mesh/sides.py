@@ -11,8 +11,8 @@ MOST_PAIRS = 4_000_000
 """Pairs of edges that are compared at a time."""
 
 
-def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return pairs of disjoint edges nearer than their reaches (n,) together [m], and their distances [m]."""
+def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Return pairs (n_pairs, 2) of disjoint edges nearer than their reaches (n,) together [m]."""
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     # Along a direction in which few sides of shapes run, an edge overlaps few others.
     along = np.stack([start, end]) @ np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])
@@ -31,12 +31,10 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np
         near = (low[one, 1] <= high[other, 1]) & (low[other, 1] <= high[one, 1])
         near &= (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2))
         one, other = one[near], other[near]
-        distances = _edge_distances(start[one], end[one], start[other], end[other])
-        close = distances <= reach[one] + reach[other]
-        found.append((one[close], other[close], distances[close]))
+        close = _edge_distances(start[one], end[one], start[other], end[other]) <= reach[one] + reach[other]
+        found.append(np.stack([one, other], axis=1)[close])
         begin = stop
-    one, other, distances = (np.concatenate(parts) for parts in zip(*found))
-    return one, other, distances
+    return np.concatenate(found)
 
 
 def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -312,10 +310,9 @@ def find_meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, 
         errors = [0.0 if side.arc is None else CHORD_ERROR * math.dist(*extent(sides)) for side in sides]
         reaches.append(LEAST_SIDE_GAP * size + np.array(errors)[numbers])
     places, ends = np.concatenate(points), np.concatenate(edges)
-    one, other, _ = nearer(places, ends, np.concatenate(reaches))
-    if not len(one):
+    pairs = np.sort(nearer(places, ends, np.concatenate(reaches)), axis=1)  # edges are numbered as their sides are
+    if not len(pairs):
         return None
-    pairs = np.sort(np.stack([one, other], axis=1), axis=1)  # edges are numbered as their sides are
     one, other = min(pairs.tolist())
     (start, end), (other_start, other_end) = places[ends[one]], places[ends[other]]
     ways = np.stack([end - start, other_start - other_end], axis=1)

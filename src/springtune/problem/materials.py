@@ -242,9 +242,7 @@ class Rubber(Material):
             Force over the cross-section at rest [Pa].
         """
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
-        slope = np.zeros(q.shape)
-        for n, c in enumerate(self.coefficients, 1):
-            slope = slope + n * c * excess ** (n - 1)
+        slope = sum((n * c * excess ** (n - 1) for n, c in enumerate(self.coefficients, 1)), np.zeros(q.shape))
         return np.asarray(2 * (q - q ** -float(RUBBER_TESTS[test])) * slope)
 
 
