@@ -1,13 +1,12 @@
 """Command line: `springtune COMMAND`."""
 
-import io
 import os
 import re
 import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, TextIO, cast
 
 import click
 
@@ -75,38 +74,21 @@ COMPLETION = "_SPRINGTUNE_COMPLETE"
 """Environment variable by which a shell asks click for completions."""
 
 
-class EscapedStream(io.TextIOBase):
+class EscapedStream:
     """Stream that escapes all control characters except line breaks and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
-    @property
-    def encoding(self) -> str:  # type: ignore[override]  # typeshed has an attribute
-        """Encoding of the stream."""
-        return self._stream.encoding
-
-    @property
-    def errors(self) -> str | None:  # type: ignore[override]
-        """Error handling of the encoding."""
-        return self._stream.errors
+    def __getattr__(self, name: str) -> Any:
+        if name not in ("encoding", "errors", "flush", "isatty", "fileno"):  # others might write past the escapes
+            raise AttributeError(name)
+        return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
         """Write a text, and return its length."""
         self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
         return len(text)
-
-    def flush(self) -> None:
-        """Flush the stream."""
-        self._stream.flush()
-
-    def isatty(self) -> bool:
-        """Whether the stream is a terminal."""
-        return self._stream.isatty()
-
-    def fileno(self) -> int:
-        """Number of the stream's file."""
-        return self._stream.fileno()
 
 
 class Commands(click.Group):
@@ -116,7 +98,8 @@ class Commands(click.Group):
         """Run a command."""
         if COMPLETION in os.environ:  # bytes, and for a shell
             return super().main(*arguments, **keywords)
-        with redirect_stdout(EscapedStream(sys.stdout)), redirect_stderr(EscapedStream(sys.stderr)):
+        out, err = (cast(TextIO, EscapedStream(stream)) for stream in (sys.stdout, sys.stderr))
+        with redirect_stdout(out), redirect_stderr(err):
             return super().main(*arguments, **keywords)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -143,8 +126,7 @@ class Commands(click.Group):
         """Command of a name, or None."""
         if cmd_name not in COMMANDS:
             return None
-        found: click.Command = import_name(f"cli.{COMMANDS[cmd_name][0]}:{cmd_name}")
-        return found
+        return cast(click.Command, import_name(f"cli.{COMMANDS[cmd_name][0]}:{cmd_name}"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands, without importing them."""

@@ -14,6 +14,7 @@ from click.core import ParameterSource
 
 from ..problem.quantities import PLANES, nearest, positive
 from ..problem.shapes import Beam
+from ..safe_io.files import number_of
 from ..safe_io.texts import mesh_size_text
 from ..studies.runs.source import is_source_tree
 
@@ -34,16 +35,6 @@ def file_errors(option: str, target: Path) -> Iterator[None]:
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else error
         raise click.ClickException(f"{option}: {target}: {why}; give a file that can be written") from None
-
-
-def check_target(option: str, target: Path) -> None:
-    """Refuse a file of unknown ending or in a missing folder; ValueError names the option."""
-    from ..handover import formats
-
-    try:
-        formats.check_target(target)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
 SPRING_FILES = (
@@ -108,9 +99,9 @@ FOR_ENGINE = ("density", "load", "force")
 
 def check_missing(given: dict[str, Any], needed: Iterable[str]) -> None:
     """Refuse a beam with missing options; ValueError has a line for each of them."""
-    constants = given["young"] is not None and given["poisson"] is not None
-    there = {"material": given["material"] or constants or None}
-    if missing := [text for name, text in MISSING.items() if name in needed and (given | there)[name] is None]:
+    constants = None if None in (given["young"], given["poisson"]) else "of one's own"
+    there = given | {"material": given["material"] or constants}
+    if missing := [text for name, text in MISSING.items() if name in needed and there[name] is None]:
         raise ValueError(*missing)
 
 
@@ -135,11 +126,7 @@ def read_material(given: Mapping[str, Any]) -> "Material":
         known = nearest(str(name), MATERIALS)
         raise ValueError(f"material: unknown material '{name}'; {known}; or give --young and --poisson")
     young, poisson = MATERIALS.get(name, (given["young"], given["poisson"]))
-    try:
-        ratio = float(poisson)
-    except ValueError:
-        ratio = math.nan
-    return Material(young, ratio, given["density"], name or "material", given["plane"] or "stress")
+    return Material(young, number_of(poisson), given["density"], name or "material", given["plane"] or "stress")
 
 
 def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
@@ -152,8 +139,7 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
     study = load_study(path)
     shapes = study.shapes
     known = list(shapes.shape) if shapes else []
-    if not name and len(known) == 1:
-        (name,) = known
+    name = known[0] if not name and len(known) == 1 else name
     if name not in known:
         raise ValueError(f"study: '{text}' names none of its shapes; give such as {path}:name; {nearest(name, known)}")
     return study, shapes, study.shape(name)
@@ -245,12 +231,9 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
         lacking = {one.name for one in materials.values() if one.density is None}
         if len(lacking) != 1:
             have = f"{len(lacking)} have none" if lacking else "each has its own"
-            raise ValueError(
-                f"density: '{density}' is for one material, and of those in the study {have}; give theirs there"
-            )
-        materials = {
-            name: replace(one, density=density) if one.density is None else one for name, one in materials.items()
-        }
+            why = f"is for one material, and of those in the study {have}"
+            raise ValueError(f"density: '{density}' {why}; give theirs there")
+        materials |= {name: replace(one, density=density) for name, one in materials.items() if one.density is None}
     size, files = _size(given, needed=sized and not shape.file), shapes.files[shape.name]
     if shape.file and (size is not None or sized and len(files) > 1):
         chosen = [file for other, file in files.items() if size is not None and math.isclose(size, other)]
@@ -277,6 +260,26 @@ def _shape_mesh(shape: "Shape", refined: Mapping[str, float], _: str, size: floa
 
 
 AnyCommand = Callable[..., None]
+
+
+def target_option(name: str, meaning: str, required: bool = False) -> Callable[[AnyCommand], AnyCommand]:
+    """Decorator that adds an option for a file of springs; a wrong ending and a missing folder are refused."""
+
+    def check(_: click.Context, __: click.Parameter, target: Path | None) -> Path | None:
+        from ..handover import formats
+
+        try:
+            if target is not None:
+                formats.check_target(target)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+        return target
+
+    meaning = f"{meaning}: {SPRING_FILES}."
+    return click.option(
+        name, "target", required=required, type=click.Path(path_type=Path), callback=check, help=meaning
+    )
+
 
 Options = dict[str, dict[str, Any]]
 """Options of a command by name, with keywords as click takes them."""

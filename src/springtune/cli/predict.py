@@ -11,21 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import examples
-from .options import (
-    FOR_ENGINE,
-    SPRING_FILES,
-    STUDY_EXAMPLE,
-    BodyOptions,
-    Options,
-    add_options,
-    check_target,
-    file_errors,
-    read_beam,
-    read_body,
-    shape_of_study,
-    sheet_options,
-)
+from . import examples, options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -34,7 +20,7 @@ if TYPE_CHECKING:
     from ..scene.measured import MeasuredTest
     from .recommendation import Subject
 
-ENGINE_OPTIONS: Options = {
+ENGINE_OPTIONS: options.Options = {
     "engine": {"help": "Engine to calibrate to, such as xpbd."},
     "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
     "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
@@ -89,7 +75,7 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
         '--material rubber --density "1000 kg/m^3" --load traction --force "0.2 N"',
     )
 )
-@sheet_options(
+@options.sheet_options(
     "A mesh type, or a mesh file; with --error mesh types, such as structured,free.  "
     "[default: structured; with --error all]",
     "for the largest stable time steps",
@@ -102,13 +88,8 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
     "[default: traction,bending,shear; after the first with --engine all]",
 )
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
-@add_options(ENGINE_OPTIONS)
-@click.option(
-    "--write",
-    "target",
-    type=click.Path(path_type=Path),
-    help=f"Write the springs of what is recommended to a file: {SPRING_FILES}.",
-)
+@options.add_options(ENGINE_OPTIONS)
+@options.target_option("--write", "Write the springs of what is recommended to a file")
 def predict(
     sheet: dict[str, Any], error: str | None, load: str | None, springs_alone: bool, target: Path | None, **engine: Any
 ) -> None:
@@ -123,14 +104,12 @@ def predict(
     """
     from .recommendation import written_text
 
-    if target is not None:
-        check_target("--write", target)
     names = None if load is None else [name.strip() for name in load.split(",") if name.strip()]
     show_progress()
     if engine["engine"] is not None:
         text, make = _answer_for_engine(sheet, engine, names or [], springs_alone)
     else:
-        body = read_body(sheet, load, sized=error is None)
+        body = options.read_body(sheet, load, sized=error is None)
         if error is None:
             text, make = _answer_for_mesh(body, _load_arguments(body, names), springs_alone)
         else:
@@ -138,11 +117,11 @@ def predict(
     click.echo(text)
     if target is not None:
         net = make()
-        with file_errors("--write", target):
+        with options.file_errors("--write", target):
             click.echo(f"\n{written_text(net, net.write(target))}")
 
 
-def _load_arguments(body: BodyOptions, names: list[str] | None) -> dict[str, Any]:
+def _load_arguments(body: options.BodyOptions, names: list[str] | None) -> dict[str, Any]:
     """Loads that count, as arguments of the library: loads of a beam, or the load case of a shape."""
     from ..prediction.choices import USUAL_LOADS, check_beam, check_loads
 
@@ -152,19 +131,19 @@ def _load_arguments(body: BodyOptions, names: list[str] | None) -> dict[str, Any
     return {"loads": check_loads(USUAL_LOADS if names is None else names)}
 
 
-def _shape_problem(body: BodyOptions) -> "ShapeProblem":
+def _shape_problem(body: options.BodyOptions) -> "ShapeProblem":
     from ..scene.boundary_problem import ShapeProblem
 
     return ShapeProblem(body.body, body.mesh, body.material, str(body.load), 1.0, "linear")
 
 
-def _subject(body: BodyOptions, known: Any) -> "Subject":
+def _subject(body: options.BodyOptions, known: Any) -> "Subject":
     from .recommendation import beam_subject, shape_subject
 
     return beam_subject(body.body, body.material, known) if body.is_beam else shape_subject(_shape_problem(body), known)
 
 
-def _answer_for_mesh(body: BodyOptions, under: dict[str, Any], springs_alone: bool) -> Answer:
+def _answer_for_mesh(body: options.BodyOptions, under: dict[str, Any], springs_alone: bool) -> Answer:
     """Best definition for one mesh."""
     from ..prediction.choices import SOLVED_PARTICLES, predict, references, shape_references
     from .recommendation import prediction_text, recommended
@@ -180,13 +159,13 @@ def _answer_for_mesh(body: BodyOptions, under: dict[str, Any], springs_alone: bo
     counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
     found = [choice for choice in found if not (springs_alone and choice.energies)]
     best, _ = recommended(found)
-    none = "nothing is recommended for this mesh, so nothing is written; take another mesh"
-    make = partial(_recommended_net, body, best.definition if best else None, under.get("loads"), none)
+    none = partial(_refuse, "nothing is recommended for this mesh, so nothing is written; take another mesh")
+    make = partial(_net, body, best.definition, loads=under.get("loads")) if best else none
     return prediction_text(_subject(body, known), body.mesh_name, counts, found), make
 
 
 def _answer_for_error(
-    body: BodyOptions, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None
+    body: options.BodyOptions, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None
 ) -> Answer:
     """Coarsest mesh that keeps an error."""
     from ..mesh.cells import MESH_TYPES
@@ -201,19 +180,12 @@ def _answer_for_error(
     best = search.best_springs if springs_alone else search.best
     if mesh := best or next(reversed(search.tried), None):
         body = replace(body, mesh_type=mesh.mesh_type, size=mesh.size)
-    none = f"no mesh keeps {error}, so nothing is written; allow a larger error"
-    make = partial(_recommended_net, body, best.choice.definition if best else None, under.get("loads"), none)
+    none = partial(_refuse, f"no mesh keeps {error}, so nothing is written; allow a larger error")
+    make = partial(_net, body, best.choice.definition, loads=under.get("loads")) if best else none
     return search_text(_subject(body, search.known), search, springs_alone), make
 
 
-def _recommended_net(body: BodyOptions, definition: str | None, loads: Any, none: str) -> "SpringNet":
-    """Springs of the definition that is recommended."""
-    if definition is None:
-        raise click.ClickException(f"--write: {none}")
-    return _net(body, definition, loads=loads)
-
-
-def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
+def _answer_for_engine(sheet: dict[str, Any], asked: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
     """Calibration of an engine."""
     from ..engines.base import ENGINES, Setting
     from ..engines.calibration import best_runnable_scene, fit_engine
@@ -222,26 +194,26 @@ def _answer_for_engine(sheet: dict[str, Any], options: dict[str, Any], loads: li
     from ..scene.single import Scene
     from .recommendation import fit_text
 
-    engine = choose(ENGINES, options["engine"], "engine")
+    engine = choose(ENGINES, asked["engine"], "engine")
     names = ("dt", "substeps", "iterations", "precision")
-    setting = Setting(**{name: options[name] for name in names if options[name] is not None})
+    setting = Setting(**{name: asked[name] for name in names if asked[name] is not None})
     engine.check(setting)
     load = loads[0] if loads else None
-    body = read_body(sheet | {"load": load, "force": options["force"]}, load, also=FOR_ENGINE)
-    make = partial(Scene, body.body, body.mesh, body.material, str(body.load), options["force"], scale=options["scale"])
-    if options["definition"] is None:
+    body = options.read_body(sheet | {"load": load, "force": asked["force"]}, load, also=options.FOR_ENGINE)
+    make = partial(Scene, body.body, body.mesh, body.material, str(body.load), asked["force"], scale=asked["scale"])
+    if asked["definition"] is None:
         scene, refused, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
     else:
-        scene, refused, tried = make(definition=options["definition"]), "", ()
+        scene, refused, tried = make(definition=asked["definition"]), "", ()
     if scene is None:
         raise click.ClickException(refused)
     fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)
-    make_net = fit.net if fit.factor == fit.factor else partial(_refuse_without_factor, fit.message)
-    return fit_text(fit, body.mesh_name, tried), make_net
+    none = partial(_refuse, f"there is no factor, so nothing is written: {fit.message}; give the setting above")
+    return fit_text(fit, body.mesh_name, tried), fit.net if fit.factor == fit.factor else none
 
 
-def _refuse_without_factor(why: str) -> "SpringNet":
-    raise click.ClickException(f"--write: there is no factor, so nothing is written: {why}; give the setting above")
+def _refuse(why: str) -> "SpringNet":
+    raise click.ClickException(f"--write: {why}")
 
 
 # -- springs for other programs ---------------------------------------------------------------------------------------
@@ -257,7 +229,7 @@ def _refuse_without_factor(why: str) -> "SpringNet":
         "--definition lattice --out hole.xml",
     )
 )
-@sheet_options("A mesh type, or a mesh file.", "for masses, and the largest stable time steps", "structured")
+@options.sheet_options("A mesh type, or a mesh file.", "for masses, and the largest stable time steps", "structured")
 @click.option(
     "--definition",
     default="patch",
@@ -268,13 +240,7 @@ def _refuse_without_factor(why: str) -> "SpringNet":
 @click.option("--load", help="What holds and pulls the beam, nothing without; or a shape, its only load without.")
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
-@click.option(
-    "--out",
-    "target",
-    required=True,
-    type=click.Path(path_type=Path),
-    help=f"File: {SPRING_FILES}; one that is there is replaced.",
-)
+@options.target_option("--out", "File, replaced if it is there", required=True)
 def springs(
     sheet: dict[str, Any],
     definition: str,
@@ -292,9 +258,8 @@ def springs(
     from ..handover.simulation import EquilibriumWarning
     from .recommendation import written_text
 
-    check_target("--out", target)
-    net = _net(read_body(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
-    with file_errors("--out", target), warnings.catch_warnings(record=True) as heard:
+    net = _net(options.read_body(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
+    with options.file_errors("--out", target), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)
         written = net.write(target)
     click.echo(written_text(net, written))
@@ -303,7 +268,7 @@ def springs(
 
 
 def _net(
-    body: BodyOptions,
+    body: options.BodyOptions,
     definition: str,
     *,
     loads: Any = None,
@@ -345,13 +310,13 @@ TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "shift", "f
 @click.option("--law", default="isotropic", show_default=True, help="isotropic, orthotropic, regions.")
 @click.option("--known", multiple=True, help="A constant that is known, such as nu=0.3; may be repeated.")
 @click.option("--beam", help="Length x height in mm, such as 100x20.")
-@click.option("--study", help=f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}.")
+@click.option("--study", help=f"A study's shape instead of a beam, such as {options.STUDY_EXAMPLE}.")
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of a beam.")
 @click.option("--load", help="Load of the beam, or load case of the shape: what is held and which side is loaded.")
 @click.option("--force", help="Force on a beam at which a field was measured, such as '400 N'.")
 @click.option("--angle", default="0 deg", help="Angle of the material's first axis from x.")
 @click.option("--shift/--no-shift", default=True, help="Remove the rigid motion of fields, and the zero of curves.")
-def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **options: Any) -> None:
+def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **test: Any) -> None:
     """Find a material's constants from measured tests of a sheet, with 95 % intervals.
 
     FILES are CSV files of one test, or YAML files with a list of tests, whose keys are the options and 'file'. Columns
@@ -359,7 +324,7 @@ def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **option
     """
     from ..scene.identify import identify as identified
 
-    rows = [options | row for path in files for row in _rows(path)]
+    rows = [test | row for path in files for row in _rows(path)]
     given = {name: value for name, _, value in (one.partition("=") for one in known)}
     found = identified([_test(**row) for row in rows], law, known=given)
     click.echo(f"{found}\n\nin a study:\n{_materials(found)}", nl=False)
@@ -376,10 +341,8 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     try:
         rows = [dict(row) for row in safe_load(read(path, LARGEST_CSV))["tests"].values()]
     except (AttributeError, KeyError, TypeError, ValueError, YAMLError) as error:
-        raise ValueError(
-            f"{path}: is no list of tests ({type(error).__name__}: {error}); give 'tests:' and names, each with some "
-            f"of the keys {', '.join(TEST_KEYS)}"
-        ) from None
+        remedy = f"give 'tests:' and names, each with some of the keys {', '.join(TEST_KEYS)}"
+        raise ValueError(f"{path}: is no list of tests ({type(error).__name__}: {error}); {remedy}") from None
     for row in rows:
         if wrong := [key for key in row if key not in TEST_KEYS]:
             raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(TEST_KEYS)}")
@@ -396,13 +359,11 @@ def _test(
     if not ((beam or study) and load and file):
         raise ValueError("load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
     if beam:
-        return MeasuredTest(read_beam(str(beam), thickness), load, file, **others)
-    about, _, body = shape_of_study(str(study))
+        return MeasuredTest(options.read_beam(str(beam), thickness), load, file, **others)
+    about, _, body = options.shape_of_study(str(study))
     if about.plane_strain:
-        raise ValueError(
-            f"study: {study}: material {about.plane_strain[0]!r} is in plane strain, and tests are analysed in plane "
-            "stress; give a study in plane stress"
-        )
+        why = f"material {about.plane_strain[0]!r} is in plane strain, and tests are analysed in plane stress"
+        raise ValueError(f"study: {study}: {why}; give a study in plane stress")
     return MeasuredTest(body, load, file, **others)
 
 

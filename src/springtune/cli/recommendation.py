@@ -219,11 +219,11 @@ def fit_text(fit: "EngineFit", mesh_name: str, tried: Sequence[str] = ()) -> str
 
 def _to_type(fit: "EngineFit", too_narrow: bool) -> Iterator[str]:
     """Lines of what to type with the factor, and without one if it is `too_narrow` or missing."""
-    from ..engines.calibration import CONVERGED_ERROR
+    from ..engines.calibration import CONVERGED_ERROR, typed_text
     from ..engines.run import off_text
 
     if found := fit.factor == fit.factor:
-        yield f"type at {fit.result.setting}, for {fit.scene.load}: {fit._typed_text}"
+        yield f"type at {fit.result.setting}, for {fit.scene.load}: {typed_text(fit.typed_rows())}"
     best = min(fit.needed, key=lambda one: (not one.found, one.frame_seconds if one.found else abs(one.solver_error)))
     if best.found and (too_narrow or not found):
         yield f"type at {best.setting}, without a factor: {best.typed}"

@@ -17,7 +17,7 @@ from ..handover.net import SpringNet
 from ..handover.simulation import ENERGY_WORDS, Net
 from ..mechanics import PRECISIONS
 from ..mechanics.energies import Energy
-from ..problem.quantities import positive
+from ..problem.quantities import positive, put
 from ..registry import Declaration, Registry, how_to_install
 from ..safe_io.texts import number_text
 
@@ -98,13 +98,11 @@ class Setting:
         if isinstance(dt, str) and "/" in dt and dt.replace("/", "", 1).replace(" ", "").isdigit():
             above, below = map(int, dt.split("/"))
             dt = above / below if below else 0.0
-        object.__setattr__(self, "dt", positive(dt, "time", "dt"))
+        substeps, iterations = count(self.substeps, "substeps"), count(self.iterations, "iterations")
+        put(self, dt=positive(dt, "time", "dt"), substeps=substeps, iterations=iterations)
         if self.dt > LONGEST_FRAME:
-            raise ValueError(
-                f"dt: {self.dt:g} s is longer than {LONGEST_FRAME:g} s; give the time of a frame such as 1/60"
-            )
-        for name in ("substeps", "iterations"):
-            object.__setattr__(self, name, count(getattr(self, name), name))
+            why = f"{self.dt:g} s is longer than {LONGEST_FRAME:g} s"
+            raise ValueError(f"dt: {why}; give the time of a frame such as 1/60")
 
     @property
     def step(self) -> float:
@@ -114,11 +112,9 @@ class Setting:
     def __str__(self) -> str:
         rate = round(1 / self.dt)
         frame = f"1/{rate} s" if abs(rate * self.dt - 1) < 1e-9 else number_text(self.dt, "s")
-        parts = [f"dt {frame}"]
-        for name in ("substeps", "iterations"):
-            value = getattr(self, name)
-            parts.append(f"{value} {name if value > 1 else name[:-1]}")
-        return ", ".join([*parts, self.precision] if self.precision else parts)
+        counts = {"substep": self.substeps, "iteration": self.iterations}
+        parts = [f"dt {frame}", *(f"{value} {name}{'s' * (value > 1)}" for name, value in counts.items())]
+        return ", ".join(filter(None, [*parts, self.precision]))
 
 
 class Session(Protocol):
@@ -237,17 +233,12 @@ class Engine(Declaration):
             If it has no such precision, or lacks an energy of a net.
         """
         if setting.precision not in ("", *self.precisions):
-            known = ", ".join(self.precisions)
-            raise EngineError(
-                f"precision: '{setting.precision}' is unknown to engine '{self.name}'; give one of {known}"
-            )
-        if net is not None:
-            if lacking := _missing_energies(self, net):
-                others = [one.name for one in ENGINES.values() if not _missing_energies(one, net)]
-                raise EngineError(
-                    f"engine '{self.name}' has no {' and no '.join(lacking)}; take another definition, or engine "
-                    f"{' or '.join(others) or 'none of these'}"
-                )
+            why = f"'{setting.precision}' is unknown to engine '{self.name}'"
+            raise EngineError(f"precision: {why}; give one of {', '.join(self.precisions)}")
+        if net is not None and (lacking := _missing_energies(self, net)):
+            others = " or ".join(one.name for one in ENGINES.values() if not _missing_energies(one, net))
+            remedy = f"take another definition, or engine {others or 'none of these'}"
+            raise EngineError(f"engine '{self.name}' has no {' and no '.join(lacking)}; {remedy}")
         if self.absent:
             raise EngineAbsentError(self.absent)
 

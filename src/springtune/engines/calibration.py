@@ -233,12 +233,7 @@ class EngineFit(Tabled):
         -------
         iterator of tuple of str
         """
-        yield from _typed_rows(ENGINES[self.result.engine], self.typed, self.scene.mesh)
-
-    @property
-    def _typed_text(self) -> str:
-        """Numbers to type with their units in a line."""
-        return typed_text(self.typed_rows())
+        return _typed_rows(ENGINES[self.result.engine], self.typed, self.scene.mesh)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
@@ -377,18 +372,12 @@ def fit_engine(
     if abs(tuned.drift) > MOST_DRIFT:
         why = "; ".join(filter(None, (why, tuned.drifts)))
     numbers = chosen.numbers(net_of(scene, factor), setting) if found else {}
+    typed = {name: value for name, value in numbers.items() if name in chosen.parameters}
+    bands = TabledList(_band(runs, name, tuned) for name in names if found)
     raised = ("substeps", "iterations") if chosen.iterates else ("substeps",)
-    return EngineFit(
-        scene,
-        factor,
-        tuned,
-        untuned,
-        {name: value for name, value in numbers.items() if name in chosen.parameters},
-        TabledList(_band(runs, name, tuned) for name in names if found),
-        TabledList(_needed(runs, name, setting) for name in raised if needed),
-        "; ".join(filter(None, (why, scene.objection))),
-        spread,
-    )
+    settings = TabledList(_needed(runs, name, setting) for name in raised if needed)
+    why = "; ".join(filter(None, (why, scene.objection)))
+    return EngineFit(scene, factor, tuned, untuned, typed, bands, settings, why, spread)
 
 
 def _typed_rows(engine: Engine, typed: Mapping[str, Any], mesh: Mesh) -> Iterator[tuple[str, str, str, str]]:
@@ -396,10 +385,9 @@ def _typed_rows(engine: Engine, typed: Mapping[str, Any], mesh: Mesh) -> Iterato
     for name, known in engine.parameters.items():
         if name in typed:
             values = np.asarray(typed[name])
-            parts = {"": values}
+            each = {"": _range_text(values)}
             if values.shape == (len(mesh.edges),):
-                parts = {f"{where} ": values[part] for where, part in places(mesh).items()}
-            each = {where: _range_text(part) for where, part in parts.items()}
+                each = {f"{where} ": _range_text(values[part]) for where, part in places(mesh).items()}
             text = ", ".join(f"{where}{value}" for where, value in each.items() if value)
             yield name, text, known.unit, known.formula
 
@@ -562,10 +550,8 @@ def best_runnable_scene(
         scene = make(definition=name)
         try:
             if abs(aside := drift(scene, scene.solve().displacements)) > MOST_DRIFT:
-                raise EngineError(
-                    f"definition '{name}' moves across by {error_text(aside)}; take a finer mesh, or another type such "
-                    "as 'structured'"
-                )
+                why = f"definition '{name}' moves across by {error_text(aside)}"
+                raise EngineError(f"{why}; take a finer mesh, or another type such as 'structured'")
             engine.start(net_of(scene), setting, 1.0)
             return scene, "", tried.tried
         except EngineError as error:

@@ -58,10 +58,8 @@ class _Session:
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float, solver: str) -> None:
         if solver == "XPBD" and np.any(net.stiffness < 0):
-            raise EngineError(
-                f"definition '{net.header['definition']}': has springs of negative stiffness, which Newton's XPBD "
-                "leaves out; take 'patch' or 'lattice'"
-            )
+            why = "has springs of negative stiffness, which Newton's XPBD leaves out; take 'patch' or 'lattice'"
+            raise EngineError(f"definition '{net.header['definition']}': {why}")
         middle = (net.points.min(axis=0) + net.points.max(axis=0)) / 2  # small numbers lose least by rounding
         with _quiet():
             import newton

@@ -159,10 +159,10 @@ class EngineResult(Tabled, Ended):
     def by_law(self) -> float:
         """Displacement of the load in the equilibrium of the engine's own law of triangles, with a factor of 1 [m]."""
         net, engine = net_of(self.scene), ENGINES[self.engine]
-        moved = None
-        if engine.law and net.energies:
-            with warnings.catch_warnings(action="ignore", category=EquilibriumWarning):
-                moved = simulate(net, engine.program, engine.laws, engine.law).displacements
+        if not (engine.law and net.energies):
+            return self.exact
+        with warnings.catch_warnings(action="ignore", category=EquilibriumWarning):
+            moved = simulate(net, engine.program, engine.laws, engine.law).displacements
         return self.exact if moved is None else self.scene.displacement_of(moved)
 
     @property
@@ -289,16 +289,11 @@ def in_engine(
     damping = 2 * frequency if damping is None else damping
     session = chosen.start(net, setting, damping)
     window = max(1, round(WINDOW_PERIODS * 2 * np.pi / frequency / setting.dt))
-    asked = (
-        max(MOST_FRAMES, ceil(LEAST_PERIODS / WINDOW_PERIODS) * window)
-        if frames is None
-        else count(frames, "frames", MOST_ITERATIONS)
-    )
+    usual = max(MOST_FRAMES, ceil(LEAST_PERIODS / WINDOW_PERIODS) * window)
+    asked = usual if frames is None else count(frames, "frames", MOST_ITERATIONS)
     if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_ITERATIONS:
-        raise EngineError(
-            f"dt: {asked} frames of {setting} are over {MOST_ITERATIONS:.0e} iterations; take a longer dt, or fewer "
-            "substeps"
-        )
+        why = f"{asked} frames of {setting} are over {MOST_ITERATIONS:.0e} iterations"
+        raise EngineError(f"dt: {why}; take a longer dt, or fewer substeps")
     extent = float(np.ptp(net.points, axis=0).max())
     rest = REST_TOLERANCES[setting.precision] if tolerance is None else number(tolerance, "tolerance")
     ended = follow(session, window, asked, rest, extent)
@@ -354,8 +349,6 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
         raise EngineError("kinematics: 'linear', and engines keep the length law of springs; take 'nonlinear'")
     scene.motion()  # refuses what has no masses, and loads that turn or prescribe displacements
     net = SpringNet.from_scene(scene, errors=False)
-    if factor == 1:
-        return net
     grown = [one.values | {name: factor * values for name, values in one.moduli.items()} for one in net.energies]
     energies = tuple(replace(one, values=values) for one, values in zip(net.energies, grown))
     return replace(net, stiffness=factor * net.stiffness, energies=energies)
@@ -385,10 +378,8 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
                 message = f"diverged within {done} frames; take more substeps, or a smaller stiffness"
                 return Ended(np.full(now.shape, np.nan), "diverged", message, done, _frame_seconds(seconds), np.nan)
             looks.append(now)
-        seen = [
-            *seen[1 - SWING_WINDOWS :],
-            np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)]),
-        ]
+        window_seen = np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)])
+        seen = [*seen[1 - SWING_WINDOWS :], window_seen]
         aside = float(np.abs(now - np.array(looks)).max())
         change, wider = float(np.abs(now - last).max()), gap
         ratio = change / before if before else float(change > 0)

@@ -86,10 +86,8 @@ class Textbook:
 def refuse_pushing_springs(net: SpringNet, why: str) -> None:
     """Refuse springs of negative stiffness."""
     if np.any(net.stiffness < 0):
-        raise EngineError(
-            f"definition '{net.header['definition']}': has springs of negative stiffness, and {why}; take 'patch' or "
-            "'lattice', or engine 'implicit-cg'"
-        )
+        why = f"has springs of negative stiffness, and {why}; take 'patch' or 'lattice', or engine 'implicit-cg'"
+        raise EngineError(f"definition '{net.header['definition']}': {why}")
 
 
 def energy_parameters(*kinds: str) -> dict[str, Parameter]:

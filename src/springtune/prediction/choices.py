@@ -20,7 +20,7 @@ from ..problem.shapes import Beam, Shape
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.texts import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
-from ..scene.mesh_cache import A_BEAM, A_MATERIAL, A_MESH, MeshCache, choose, is_a
+from ..scene.mesh_cache import A_BEAM, MeshCache, choose, is_a
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
@@ -158,17 +158,14 @@ def number_text(value: float, form: Callable[[float], str], missing: str) -> str
 def check_beam(beam: Beam) -> None:
     """Refuse a beam of absurd size, or too slender for its references."""
     is_a(beam, Beam, "beam", A_BEAM)
-    sides = {"long": beam.length, "high": beam.height, "thick": beam.thickness}
-    for word, side in sides.items():
+    for word, side in {"long": beam.length, "high": beam.height, "thick": beam.thickness}.items():
         if not SHORTEST_SIDE <= side <= LONGEST_SIDE:
             remedy = f"give {1e3 * SHORTEST_SIDE:g} to {1e3 * LONGEST_SIDE:g} mm, or correct its unit"
             raise ValueError(f"beam {beam.name!r}: is {1e3 * side:.6g} mm {word}, which no beam is; {remedy}")
     slenderness = max(beam.length, beam.height) / min(beam.length, beam.height)
     if slenderness > MOST_SLENDER:
-        raise ValueError(
-            f"beam {beam.name!r}: one side is {slenderness:.3g} times the other, and at most {MOST_SLENDER:g} times "
-            "has a reference; such shapes are for beam theory"
-        )
+        why = f"one side is {slenderness:.3g} times the other, and at most {MOST_SLENDER:g} times has a reference"
+        raise ValueError(f"beam {beam.name!r}: {why}; such shapes are for beam theory")
 
 
 def predicted() -> tuple[str, ...]:
@@ -309,14 +306,9 @@ def trial(
 
 
 def beam_problems(
-    beam: Beam,
-    mesh: Mesh | GroupedMesh,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
-    loads: Iterable[str] = USUAL_LOADS,
+    beam: Beam, mesh: Mesh | GroupedMesh, material: AnyMaterial | Mapping[str, AnyMaterial], loads: Iterable[str]
 ) -> list[BeamProblem]:
     """Statements of 1 N in linear kinematics, one for each load."""
-    is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, Material, "material", A_MATERIAL)
     first, *others = check_loads(loads)
     one = BeamProblem(beam, mesh, material, first, 1.0, "linear")
     return [one, *(BeamProblem(beam, mesh, material, load, 1.0, "linear", one.sheet) for load in others)]
@@ -345,10 +337,8 @@ def only_load(shape: Shape, load: str | None) -> str:
     if load is not None:
         return load
     if len(shape.loads) != 1:
-        raise ValueError(
-            f"load: none, and {shape.name!r} has {len(shape.loads)}; give one of them, such as load='pull'; "
-            f"known: {', '.join(shape.loads) or 'none'}"
-        )
+        remedy = f"give one of them, such as load='pull'; known: {', '.join(shape.loads) or 'none'}"
+        raise ValueError(f"load: none, and {shape.name!r} has {len(shape.loads)}; {remedy}")
     return next(iter(shape.loads))
 
 
@@ -360,10 +350,8 @@ def shape_references(problem: ShapeProblem) -> References:
     solved, lacking = solve_each(problem.shape, case, problem.by_part, as_read)
     found = References(lacking)
     for one in solved:
-        found |= {
-            name: QuantityReference(float(value), float(one.error_estimates[name]))
-            for name, value in one.values.items()
-        }
+        for name, value in one.values.items():
+            found[name] = QuantityReference(float(value), float(one.error_estimates[name]))
     small = {name for one in solved for name in one.negligible if one.values[name]}
     if len(small) < len(case.quantities):
         found |= dict.fromkeys(small, "next to nothing beside what is largest of its kind; an error would say nothing")
@@ -379,8 +367,7 @@ def errors_under(problem: BoundaryProblem, springs: Springs, known: References) 
         return dict.fromkeys(labels, f"unstable: {error}")
     if found.status is not Status.SOLVED:
         return dict.fromkeys(labels, found.message)
-    of_beam = isinstance(problem, BeamProblem)
-    values = {problem.load: found.displacement} if of_beam else problem.values(springs, found)
+    values = {problem.load: found.displacement} | problem.values(springs, found)
     wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
     return dict(quantity_errors({name: values[name] for name in labels}, wanted))
 
@@ -404,11 +391,10 @@ class Trial:
     ) -> None:
         self.problems, self.known, first = problems, known, problems[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
-        self._sheet = first.sheet
-        self._sheet.networks = len({one.loading.held.tobytes() for one in problems})
+        first.sheet.networks = len({one.loading.held.tobytes() for one in problems})
         self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
-        self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
+        self._moduli: dict[tuple[bytes, ...], tuple[float, float]] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamProblem) else None
         self._springs: dict[str, Springs] = {}
         self._first: dict[tuple[object, ...], str] = {}  # definition by its springs
@@ -454,7 +440,7 @@ class Trial:
         if any(one.kind == "stress" for one in first.case.quantities):  # that is of single springs
             return name
         motion = np.random.default_rng(0).standard_normal(self.mesh.points.shape)
-        forces = springs.reference * self._sheet.network(first.loading.held, springs).linear_forces_over_k(motion)
+        forces = springs.reference * first.sheet.network(first.loading.held, springs).linear_forces_over_k(motion)
         for other, known in self._forces.items():
             if np.linalg.norm(forces - known) <= EQUAL_FORCES * np.linalg.norm(known):
                 return other
@@ -482,17 +468,15 @@ class Trial:
         springs = self.springs(name)
         if springs is None:
             return None if "springs" in self.failures[name] and name not in self._also else (False, inf)
-        found = self.errors(name)
-        errors = [one for one in found.values() if not isinstance(one, str)]
-        worst = worst_of(errors) if len(errors) == len(found) else inf
+        errors = self.errors(name).values()
+        worst = inf if any(isinstance(one, str) for one in errors) else worst_of(cast(Iterable[float], errors))
         return None if self.same[name] != name else (bool(springs.energies), worst)
 
     def choice(self, name: str) -> Choice:
         """Choice of a definition; one without springs has NaN for all numbers."""
         springs = self.springs(name)
         if springs is None:
-            errors: dict[str, float] = dict.fromkeys(self.known, nan)
-            return Choice(name, nan, nan, "", False, errors, nan, nan, self.failures[name])
+            return Choice(name, nan, nan, "", False, dict.fromkeys(self.known, nan), nan, nan, self.failures[name])
         found = self.errors(name)
         failures = {label: error for label, error in found.items() if isinstance(error, str)}
         if failures and self._test is None:
@@ -500,34 +484,24 @@ class Trial:
         young = poisson = nan
         if self._test is not None:
             key = key_of(springs)
-            if key not in self._moduli:
-                try:
+            try:
+                if key not in self._moduli:
                     self._moduli[key] = self._test.axial(springs)
-                except SingularError as error:
-                    self._moduli[key] = f"unstable: {error}"
-            moduli = self._moduli[key]
-            if isinstance(moduli, str):
-                failures["patch test"] = moduli
-            else:
-                material = cast(Material, self.materials[0]).in_plane
-                young = float(moduli[0] * springs.reference / (material.young_modulus * self.thickness)) - 1
-                poisson = float(moduli[1])
-        return Choice(
-            name,
-            *in_words(self._sheet, springs),
-            bool(springs.energies),
-            errors={label: nan if isinstance(error, str) else error for label, error in found.items()},
-            young_modulus_error=young,
-            poisson_ratio=poisson,
-            failures=failures,
-        )
+                modulus, poisson = self._moduli[key]
+                wanted = cast(Material, self.materials[0]).in_plane.young_modulus * self.thickness
+                young = modulus * springs.reference / wanted - 1
+            except SingularError as error:
+                failures["patch test"] = f"unstable: {error}"
+        errors = {label: nan if isinstance(error, str) else error for label, error in found.items()}
+        words = in_words(self.problems[0].sheet, springs)
+        return Choice(name, *words, bool(springs.energies), errors, float(young), float(poisson), failures)
 
     def step_limit(self, name: str) -> float:
         """Largest stable explicit step [s]; NaN without masses or where it is not found."""
         inertia = self.problems[0].masses()
         if inertia is None:
             return nan
-        steps = stable_steps(MeshCache(self.mesh, self.thickness), self._springs[name], inertia, ["central-difference"])
+        steps = stable_steps(self.problems[0].sheet, self._springs[name], inertia, ["central-difference"])
         return nan if isinstance(steps, str) else float(steps["central-difference"])
 
 

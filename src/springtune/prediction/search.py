@@ -7,7 +7,6 @@ twice as fine, is kept, with a margin: the last change may happen once more.
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count, takewhile
@@ -23,26 +22,12 @@ from ..problem.compare import error_text
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import quantity
 from ..problem.shapes import Beam, Shape
+from ..safe_io.files import number_of
 from ..safe_io.texts import Tabled, mesh_size_text
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
 from ..scene.mesh_cache import A_MATERIAL, is_a
-from .choices import (
-    SEARCHED_PARTICLES,
-    USUAL_LOADS,
-    Choice,
-    References,
-    Trial,
-    as_sure_as,
-    beam_problems,
-    check_beam,
-    check_loads,
-    check_names,
-    in_order,
-    number_text,
-    only_load,
-    references,
-    shape_references,
-)
+from . import choices
+from .choices import SEARCHED_PARTICLES, USUAL_LOADS, Choice, References, Trial, as_sure_as, in_order
 
 logger = logging.getLogger(__name__)
 
@@ -167,7 +152,7 @@ class MeshChoice(Tabled):
         for name in ("cells", "particles", "springs"):
             yield name, f"{getattr(self, name):,}"
         for name, error in self.choice.errors.items():
-            yield name, number_text(error, error_text, "")
+            yield name, choices.number_text(error, error_text, "")
         if not math.isnan(self.step_limit):
             yield "largest step", f"{self.step_limit:.3g} s"
 
@@ -233,9 +218,7 @@ class MeshSearch(Tabled):
         yield "solved", f"{len(self.tried)} meshes, of at most {self.most:,} particles"
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
-        def rank(one: MeshChoice) -> tuple[int, int]:
-            return one.particles, one.springs
-
+        rank = attrgetter("particles", "springs")
         ranked = sorted(filter(None, found.values()), key=rank)
         alike = [one for one in ranked if rank(one) == rank(ranked[0])]
         tie = attrgetter("choice.energies", "choice.definition", "mesh_type")
@@ -244,12 +227,9 @@ class MeshSearch(Tabled):
 
 def asked_error(value: float | str, name: str = "error") -> float:
     """Error to keep [1], of a number or a text such as "1 %"; messages call it by a name."""
-    number = math.nan
+    number = value if isinstance(value, int | float) else math.nan
     if isinstance(value, str) and value.strip().endswith("%"):
-        with suppress(ValueError):
-            number = float(value.strip().removesuffix("%")) / 100
-    elif isinstance(value, int | float):
-        number = value
+        number = number_of(value.strip().removesuffix("%")) / 100
     if not 0 < number < 1:
         raise ValueError(f"{name}: {value!r} is no error above 0 and below 100 %; give one such as '1 %'")
     return float(number)
@@ -318,21 +298,19 @@ def find_mesh(
     if isinstance(beam, Shape):
         if loads is not USUAL_LOADS or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
-        load = only_load(beam, load)
+        load = choices.only_load(beam, load)
         families = [_shape_family(beam, material, load, make or partial(mesh_shape, beam))]
-        known = shape_references(cast(ShapeProblem, families[0].problems(families[0].side / 4)[0]))
+        known = choices.shape_references(cast(ShapeProblem, families[0].problems(families[0].side / 4)[0]))
         what, remedy = f"load {load!r}", "; take it out of the quantities"
     elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     else:
-        check_beam(beam)
         is_a(material, Material, "material", A_MATERIAL)
         assert isinstance(material, Material)  # for type checkers
-        loads = check_loads(loads)
         given = MESH_TYPES if mesh_types is None else mesh_types
-        names = check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
-        families = [_beam_family(beam, material, loads, name) for name in names]
-        known = references(beam, material, loads)
+        names = choices.check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
+        known = choices.references(beam, material, loads)
+        families = [_beam_family(beam, material, tuple(known), name) for name in names]
         what, remedy = "loads", ""
     for name, one in known.items():
         if isinstance(one, str) or not one.value:
@@ -344,9 +322,8 @@ def find_mesh(
         raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")
     searches = [_Search(family, known, estimates, wanted, most) for family in families]
     found, alone = ({one.family.name: one.find(only) for one in searches} for only in (False, True))
-    return MeshSearch(
-        wanted, tuple(known), most, known, found, alone, tuple(one for search in searches for one in search.solved)
-    )
+    solved = tuple(one for search in searches for one in search.solved)
+    return MeshSearch(wanted, tuple(known), most, known, found, alone, solved)
 
 
 @dataclass(frozen=True)
@@ -363,13 +340,12 @@ class _Family:
 def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: str) -> _Family:
     """Meshes of a beam, of one type."""
     box, make = (beam.length, beam.height), MESH_TYPES[name]
-    return _Family(
-        name,
-        min(box),
-        beam.height / make.row_height if beam.height <= beam.length else beam.length,
-        partial(make.particles, *box),
-        lambda size: beam_problems(beam, make(*box, size), material, loads),
-    )
+    one_cell = beam.height / make.row_height if beam.height <= beam.length else beam.length
+
+    def problems(size: float) -> Sequence[BoundaryProblem]:
+        return choices.beam_problems(beam, make(*box, size), material, loads)
+
+    return _Family(name, min(box), one_cell, partial(make.particles, *box), problems)
 
 
 def _shape_family(
@@ -377,18 +353,14 @@ def _shape_family(
 ) -> _Family:
     """Meshes of a shape under a load case."""
     if shape.file:
-        raise ValueError(
-            f"shape {shape.name!r}: has the mesh of its file, so there is none to be found; give an outline, or files "
-            "of finer meshes"
-        )
+        why = "has the mesh of its file, so there is none to be found"
+        raise ValueError(f"shape {shape.name!r}: {why}; give an outline, or files of finer meshes")
     side = float(min(np.ptp(shape.extent, axis=0)))
-    return _Family(
-        "free",
-        side,
-        side,
-        lambda size: shape.area / (ROW_HEIGHT * size**2),
-        lambda size: [ShapeProblem(shape, make(size), material, load, 1.0, "linear")],
-    )
+
+    def problems(size: float) -> Sequence[BoundaryProblem]:
+        return [ShapeProblem(shape, make(size), material, load, 1.0, "linear")]
+
+    return _Family("free", side, side, lambda size: shape.area / (ROW_HEIGHT * size**2), problems)
 
 
 def _cells(rung: int) -> int:
@@ -466,22 +438,21 @@ class _Search:
         text = f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm"
         return min(self.family.side, quantity(text, "length", "size"))
 
-    def _solve(self, cells: float, names: Sequence[str], whole: bool = True) -> SolvedMesh | None:
-        """Solve definitions on a mesh, all without names; None for a `whole` division without a mesh of its own."""
+    def _solve(self, cells: float, names: Sequence[str], whole: bool = True) -> None:
+        """Solve definitions on a mesh, all without names; nothing for a `whole` division without a mesh of its own."""
         known = self._meshes.get(self._keys.get(cells, b""))
         if known and all(name in known.errors for name in names):
-            return known
-        problems = self.family.problems(self._size(cells))
+            return
+        size = self._size(cells)
+        problems = self.family.problems(size)
         mesh = problems[0].mesh
-        logger.info(
-            "solving %s %s: %s particles", self.family.name, mesh_size_text(self._size(cells)), len(mesh.points)
-        )
+        logger.info("solving %s %s: %s particles", self.family.name, mesh_size_text(size), len(mesh.points))
         # A mesh of its own has more particles than coarser ones and fewer than finer ones.
         others = [one for one in self.solved if one.cells == int(one.cells) != cells] if whole else []
         if any((len(mesh.points) > one.particles) != (cells > one.cells) for one in others):
-            return None
+            return
         key = self._keys.setdefault(cells, mesh.points.tobytes())
-        new = SolvedMesh(self.family.name, self._size(cells), cells, len(mesh.points), len(mesh.edges), {}, ())
+        new = SolvedMesh(self.family.name, size, cells, len(mesh.points), len(mesh.edges), {}, ())
         found = self._meshes.get(key, new)
         errors, energies = dict(found.errors), found.energies
         left = [name for name in names if name not in errors]
@@ -492,28 +463,23 @@ class _Search:
             errors[name] = {load: math.nan if isinstance(error, str) else error for load, error in one.items()}
             energies += (name,) * bool(springs and springs.energies)
         self._meshes[key] = replace(found, errors=errors, energies=energies)
-        return self._meshes[key]
 
     def _choice(self, cells: int, names: list[str], springs_alone: bool) -> MeshChoice:
         """The best of some definitions on a mesh."""
         one = self._meshes[self._keys[cells]]
         name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
         tried = Trial(self.family.problems(one.size), self.known, [name])
-        return MeshChoice(
-            self.family.name,
-            one.size,
-            cells,
-            replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone))),
-            one.particles,
-            one.springs,
+        choice = replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone)))
+        step, finer = (
             tried.step_limit(name),
-            tuple(finer for finer in self.solved if finer.cells > cells and name in finer.errors),
+            (each for each in self.solved if each.cells > cells and name in each.errors),
         )
+        return MeshChoice(one.mesh_type, one.size, cells, choice, one.particles, one.springs, step, tuple(finer))
 
-    def _keeps(self, name: str, mesh: SolvedMesh | None) -> bool:
-        """Whether a definition keeps the error on a mesh, if there is one; the reference's error estimate is added."""
-        errors = mesh.errors[name] if mesh else {}
-        return all(abs(error) + self._estimates[load] <= self._error for load, error in errors.items())  # not NaN
+    def _keeps(self, name: str, mesh: SolvedMesh) -> bool:
+        """Whether a definition keeps the error on a mesh; the reference's error estimate is added."""
+        errors = mesh.errors[name].items()
+        return all(abs(error) + self._estimates[load] <= self._error for load, error in errors)  # not NaN
 
     def _on(self, name: str) -> list[SolvedMesh]:
         """Meshes of whole divisions that a definition was tried on, from coarse to fine."""
@@ -521,8 +487,7 @@ class _Search:
 
     def _promising(self, name: str) -> bool:
         """Whether a definition may keep the error on the finest mesh, if the error is proportional to the mesh size."""
-        on = self._on(name)
-        doubling = self._doubling(name)
+        on, doubling = self._on(name), self._doubling(name)
         if doubling is None or FINEST_CELLS_RATIO * REGULAR_FROM_CELLS > on[-1].cells:
             return bool(on)
         left = EXTRAPOLATION_MARGIN * (1 - on[-1].cells / self._finest)
@@ -533,8 +498,7 @@ class _Search:
 
     def _steady(self, name: str) -> bool:
         """Whether a definition would keep the error if it changed once more by as much as over the last doubling."""
-        doubling = self._doubling(name)
-        if doubling is None:
+        if not (doubling := self._doubling(name)):
             return False
         before, last = doubling
         return all(abs(2 * last[load] - before[load]) <= self._error for load in last)

@@ -29,18 +29,7 @@ from ..problem.quantities import positive
 from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_body
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
-from .mesh_cache import (
-    A_BEAM,
-    A_MATERIAL,
-    A_MESH,
-    A_SHAPE,
-    Loading,
-    MeshCache,
-    Solution,
-    choose,
-    is_a,
-    solve_and_judge,
-)
+from .mesh_cache import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, Loading, MeshCache, Solution, choose, is_a, solve_and_judge
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
@@ -132,16 +121,12 @@ class BoundaryProblem(ABC):
         densities = {name: one.density for name, one in self.by_part.items()}
         return None if None in densities.values() else particle_masses(self.grouped, self.thickness, densities)
 
-    def factor(self, springs: Springs) -> float:
-        """Factor of the loading over the reference stiffness."""
-        return self.force / springs.reference
-
     def solve(self, springs: Springs) -> Solution:
         """Equilibrium, judged; its displacement is the first quantity of interest."""
         problem, first = self.sheet.problem(self.loading, springs), self.case.quantities[0]
         return solve_and_judge(
             problem,
-            self.factor(springs),
+            self.force / springs.reference,
             self.kinematics,
             lambda moved: self._value(first, springs, problem.network, moved),
         )
@@ -190,13 +175,12 @@ class BoundaryProblem(ABC):
 
     def reactions(self, springs: Springs, network: Network, moved: np.ndarray) -> np.ndarray:
         """Forces of the supports on the particles [N], shape (n_points, 2); zero in free directions."""
-        resistance = (
-            network.linear_forces_over_k(moved) if self.kinematics == "linear" else network.forces_over_k(moved)
-        )
-        load, turning = self.loading.pattern, self.loading.follower
-        if turning is not None and self.loading.dead is not None:
-            load = self.loading.dead + turning.forces(moved)
-        return np.where(self.loading.held, springs.reference * resistance - load, 0.0)
+        linear, loading = self.kinematics == "linear", self.loading
+        resistance = network.linear_forces_over_k(moved) if linear else network.forces_over_k(moved)
+        load = loading.pattern
+        if loading.follower is not None and loading.dead is not None:
+            load = loading.dead + loading.follower.forces(moved)
+        return np.where(loading.held, springs.reference * resistance - load, 0.0)
 
 
 class BeamProblem(BoundaryProblem):
@@ -236,11 +220,6 @@ class BeamProblem(BoundaryProblem):
         """Refuse a definition that is not for the load."""
         if definition.uniaxial and not self.kind.uniaxial:
             raise ValueError(f"definition: {definition.name!r} is not for {self.load!r}; take it for traction")
-
-    def masses(self) -> np.ndarray | None:
-        """Masses of the particles [kg], shape (n_points,); None without a density."""
-        density = self.material.density
-        return None if density is None else density * self.thickness * self.mesh.particle_areas
 
     def reference(self, law: str = "") -> "ReferenceSolution | FiniteStrainSolution":
         """Converged finite-element solution, in small strain or of the material's law at finite strain."""
@@ -341,10 +320,10 @@ class ShapeProblem(BoundaryProblem):
 
     def springs(self, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
-        springs, seconds = super().springs(definition, stiffness)
-        if springs.lateral:
+        found = super().springs(definition, stiffness)
+        if found[0].lateral:
             raise DefinitionError("needs a stress on the long faces of a beam; choose another definition")
-        return springs, seconds
+        return found
 
     def reference(self, law: str = "") -> "ShapeReference":
         """Converged finite-element solution, once for all scenes of a sheet."""
@@ -373,8 +352,7 @@ class ShapeProblem(BoundaryProblem):
 
 def sheet_of(mesh: Mesh, thickness: float, sheet: MeshCache | None) -> MeshCache:
     """Return the sheet of another scene, if it is of this mesh and thickness, or a new one."""
-    if sheet is None:
-        return MeshCache(mesh, thickness)
+    sheet = MeshCache(mesh, thickness) if sheet is None else sheet
     is_a(sheet, MeshCache, "sheet", "that of another scene")
     if sheet.mesh is not mesh or sheet.thickness != thickness:
         raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
@@ -449,12 +427,8 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
     what, remedy = f"shape {shape.name!r}", "mesh it with springtune.mesh_shape"
     mesh, (low, high) = grouped.mesh, shape.extent
     small = MOST_DISTANCE_FROM_SIDE * max(high[0] - low[0], high[1] - low[1])
-
-    def filled(part: str | None) -> object:
-        """Material of a part, or the name of a part that the mesh lacks; None for nothing."""
-        return None if part is None else materials.get(part, part)
-
-    sides = [side for one in shape.rounds if filled(one.inner) != filled(one.outer) for side in one.sides]
+    known = {part: part for one in shape.rounds for part in (one.inner, one.outer)} | {**materials}
+    sides = [side for one in shape.rounds if known[one.inner] != known[one.outer] for side in one.sides]
     particles = np.unique(mesh.edges[mesh.on_outline | _between(grouped, materials)])
     near = np.array([_distances(side, mesh.points[particles]) for side in sides]) <= small
     if not near.any(axis=0).all():
@@ -484,14 +458,11 @@ def _between(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> np.n
     mesh, several = grouped.mesh, list(dict.fromkeys(materials.values()))
     if len(several) < 2:
         return np.zeros(len(mesh.edges), dtype=bool)
-    least, most = np.full(len(mesh.edges), len(several)), np.full(len(mesh.edges), -1)
-    numbers = {name: several.index(one) for name, one in materials.items()}
+    there = np.zeros((len(several), len(mesh.edges)), dtype=bool)
     for count, names in part_names(grouped).items():
-        edges = mesh.cell_edges[count]
-        of_cells = np.array([numbers[name] for name in names])[:, None]
-        np.minimum.at(least, edges, np.broadcast_to(of_cells, edges.shape))
-        np.maximum.at(most, edges, np.broadcast_to(of_cells, edges.shape))
-    return least < most
+        of_cells = np.array([several.index(materials[name]) for name in names])
+        there[of_cells[:, None], mesh.cell_edges[count]] = True
+    return there.sum(axis=0) > 1
 
 
 def _distances(side: OutlineSide, points: np.ndarray) -> np.ndarray:

@@ -163,9 +163,8 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     if scene.follower:
         raise ValueError(f"load: {scene.load!r} turns with its side, and has no curve; take linear kinematics")
     try:
-        ratios = np.sort(
-            np.asarray(USUAL_RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel()
-        )
+        given = USUAL_RATIOS if stiffness_ratios is None else stiffness_ratios
+        ratios = np.sort(np.asarray(given, dtype=float).ravel())
     except (TypeError, ValueError, OverflowError):
         ratios = np.zeros(0)
     if not len(ratios) or not ((ratios > LEAST_RATIO) & (ratios < 1 / LEAST_RATIO)).all():
@@ -173,20 +172,19 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     beam, kind, force = scene.beam, scene.kind, scene.force
     stiffness = ratios * scene.material.in_plane.young_modulus * beam.thickness
     path = follow(scene.sheet, kind, scene.kinematics, force / stiffness)
-    displacement, stable = path.values, path.stable
     try:
         reference, objection = scene.reference_values()["displacement"], scene.objection
     except RuntimeError as error:
         reference, objection = np.nan, f"no reference: {error}"
     faces = np.concatenate([scene.mesh.outline_edges(1, value) for value in (0.0, scene.mesh.points[:, 1].max())])
     edge = float(np.median(np.abs(np.diff(scene.mesh.points[faces, 0]))))
-    best = meeting(path, force, stiffness, displacement, stable, reference, objection)
+    best = meeting(path, force, stiffness, path.values, path.stable, reference, objection)
     return Curve(
         stiffness,
-        displacement,
-        deformation_error(displacement, reference),
-        stable,
-        ending(path, force, stable),
+        path.values,
+        deformation_error(path.values, reference),
+        path.stable,
+        ending(path, force, path.stable),
         best.stiffness,
         best.status,
         best.message,

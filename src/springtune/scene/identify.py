@@ -30,11 +30,7 @@ from .mesh_cache import choose, is_a
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SHEET_LAWS = {
-    "isotropic": ("E", "nu"),
-    "orthotropic": ("E1", "E2", "nu12", "G12"),
-    "regions": ("nu",),
-}
+SHEET_LAWS = {"isotropic": ("E", "nu"), "orthotropic": ("E1", "E2", "nu12", "G12"), "regions": ("nu",)}
 """Laws, and the names of their constants; regions have a modulus each, too, such as ``E core``."""
 
 USUAL_POISSON_RATIOS = {"nu": 0.3, "nu12": 0.3}
@@ -123,12 +119,6 @@ def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
         stiffness = rotated(np.linalg.inv(compliance), angle)
         found.append([stiffness[place] for place in ENTRIES])
     return np.array(found)
-
-
-def inverse(slopes: np.ndarray) -> np.ndarray:
-    """Return steps by the coefficients of the left singular vectors of slopes, however large."""
-    _, sizes, right = np.linalg.svd(slopes, full_matrices=False)
-    return np.asarray(right.T / sizes.clip(1e-100))
 
 
 def squares(tables: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
@@ -237,7 +227,8 @@ class Model:
             before, noise = noise, np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
             if np.allclose(noise, before, rtol=1e-3, atol=0):
                 break
-        half = t.ppf(0.975, freedom.sum()) * np.linalg.norm(inverse(table(steps)[:, 1:]), axis=1)
+        _, sizes, right = np.linalg.svd(table(steps)[:, 1:], full_matrices=False)
+        half = t.ppf(0.975, freedom.sum()) * np.linalg.norm(right.T / sizes.clip(1e-100), axis=1)
         found = list(tables(steps.tobytes(), noise.tobytes()))
         return vary(constants, names, steps), found, noise, half.clip(max=600)  # exp(700) is infinite
 
@@ -309,10 +300,7 @@ class Identified(Tabled):
 
 
 def identify(
-    tests: MeasuredTest | Sequence[MeasuredTest],
-    law: str = "isotropic",
-    *,
-    known: Mapping[str, Number] | None = None,
+    tests: MeasuredTest | Sequence[MeasuredTest], law: str = "isotropic", *, known: Mapping[str, Number] | None = None
 ) -> Identified:
     r"""Find the constants of a material from measured tests, with intervals of 95 %.
 
@@ -353,7 +341,7 @@ def identify(
     tests = list(tests) if isinstance(tests, Sequence) else [tests]
     for test in tests:
         is_a(test, MeasuredTest, "tests", "springtune.MeasuredTest(beam, 'traction', 'pull.csv')")
-    bodies = [body_of_test(test) for test in tests]
+    bodies = [*map(body_of_test, tests)]
     parts = sorted({part for shape, _, mesh in bodies for part in (parts_of(mesh) if mesh else ("", *shape.parts))})
     regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []
     if len(parts) > 1 and not regions:
@@ -399,10 +387,9 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str,
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
         if name in USUAL_POISSON_RATIOS and not -1 < number_of(value) <= 0.5:
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
-        constants[name] = (
-            number_of(value) if name in USUAL_POISSON_RATIOS else positive(value, "stress", f"known: {name}")
-        )
-    constants = assume_usual(constants, [name for name in {"nu12": 0, "G12": 0} if name in names and name not in known])
+        is_ratio = name in USUAL_POISSON_RATIOS
+        constants[name] = number_of(value) if is_ratio else positive(value, "stress", f"known: {name}")
+    constants = assume_usual(constants, {"nu12", "G12"} & {*names} - {*known})
     if len(known) == len(names):
         raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
     return constants, [name for name in names if name not in known]
@@ -431,12 +418,8 @@ def _fitted(
     constants, tables, noise, half = model.fit(assume_usual(constants, lacking), names)
     for block, table, left in zip(model.blocks, tables, squares(tables, noise)):
         own = block.unshifted(block.values)
-        share = left / (own @ own or 1)
-        if (
-            block.places.ndim > 1
-            and share > 1 - EXPLAINED_SHARE
-            and correlation_excess(block.by_place(table[:, 0]), block.places) > 0
-        ):
+        share, excess = left / (own @ own or 1), correlation_excess(block.by_place(table[:, 0]), block.places)
+        if block.places.ndim > 1 and share > 1 - EXPLAINED_SHARE and excess > 0:
             explained = f"the load explains {100 * max(1 - share, 0):.0f} % of it"
             raise TestDataError(f"{block.label}: {explained}; check load, columns and signs")
     return lacking, constants, tables, noise, half

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from math import inf
 from typing import Any, TypeVar, get_args
 
@@ -29,12 +29,8 @@ NETWORKS_KEPT = 6
 """Factorized networks of a mesh that are kept; few are enough for scenes in order."""
 
 
-A_BEAM, A_SHAPE, A_MESH, A_MATERIAL = (
-    "springtune.Beam('200 mm', '40 mm')",
-    "springtune.Shape.rectangle('200 mm', '40 mm')",
-    "springtune.make_mesh(beam, 'structured', '5 mm')",
-    "springtune.Material('210 GPa', 0.3)",
-)
+A_BEAM, A_SHAPE = "springtune.Beam('200 mm', '40 mm')", "springtune.Shape.rectangle('200 mm', '40 mm')"
+A_MESH, A_MATERIAL = "springtune.make_mesh(beam, 'structured', '5 mm')", "springtune.Material('210 GPa', 0.3)"
 """Calls that make arguments, for messages."""
 
 AnyDefinition = str | Definition | Callable[..., Springs]
@@ -110,10 +106,9 @@ def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
 
 @dataclass(frozen=True)
 class Solution:
-    """An equilibrium of a network, judged, NaN without one; `load` is over the reference stiffness."""
+    """An equilibrium of a network, judged, NaN without one."""
 
     problem: StaticProblem
-    load: float
     equilibrium: Equilibrium
     status: Status
     message: str
@@ -128,7 +123,7 @@ def solve_and_judge(
     found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
     status, message, pivots = problem.judge(load, found)
     value = displacement(found.displacements) if found.converged else np.nan
-    return Solution(problem, load, found, status, message, pivots, value)
+    return Solution(problem, found, status, message, pivots, value)
 
 
 class MeshCache:
@@ -140,18 +135,14 @@ class MeshCache:
     def __init__(
         self, mesh: Mesh, thickness: float, networks: int = NETWORKS_KEPT, like: "MeshCache | None" = None
     ) -> None:
-        self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
-        self.weights = cache(lambda kind: weights(mesh, kind))
-        self.measured = cache(lambda kind: measured(mesh, kind))
-        self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))
-        self.loaded = cache(lambda kind: loaded_box(mesh, kind))
+        self.mesh, self.thickness, self.networks = mesh, thickness, networks
+        self.weights, self.measured = cache(partial(weights, mesh)), cache(partial(measured, mesh))
+        self.loading, self.loaded = cache(partial(box_loading, mesh)), cache(partial(loaded_box, mesh))
         self.filled: set[Beam] = set()
         self.references: dict[tuple[object, ...], Any] = {}
-        self.networks = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
         self._typical: tuple[np.ndarray, dict[str, float]] | None = None
-        shared = like is not None and mesh.shares_cells(like.mesh)
-        self._patterns: dict[bytes, Network] = dict(like._patterns) if like is not None and shared else {}
+        self._patterns: dict[bytes, Network] = dict(like._patterns) if like and mesh.shares_cells(like.mesh) else {}
         self._networks: dict[bytes, tuple[Network, dict[tuple[object, ...], StaticProblem]]] = {}
 
     def derive(
@@ -171,9 +162,9 @@ class MeshCache:
         first, *others = by_part.values()
         given: float | list[Case] | None = stiffness
         key: tuple[object, ...] = definition, tuple(by_part.items()), grouped if others else None, stiffness
-        if definition.needs == "cases" and case is None:
+        if definition.needs == "cases" and not case:
             given = patch_cases(self.mesh, first, self.thickness)
-        elif definition.needs == "cases" and case is not None:
+        elif definition.needs == "cases" and case:
             loading, factor, field = self._loading(case[0]), *case[1:]
             if field is None:
                 raise DefinitionError("needs the reference's displacements, and there are none")
@@ -189,10 +180,8 @@ class MeshCache:
                 springs = derive_by_parts(definition, grouped, by_part, self.thickness, given)
             else:
                 springs = definition.springs(self.mesh, first, self.thickness, given)
-            seconds = time.perf_counter() - begin
-            self.deriving += seconds
-            self._derived = key, springs, seconds
-        return self._derived[1], self._derived[2]
+            self._derived = key, springs, time.perf_counter() - begin
+        return self._derived[1:]
 
     def typical_stiffness(self, springs: Springs) -> dict[str, float]:
         """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
@@ -216,17 +205,15 @@ class MeshCache:
         """Network, and its problems so far."""
         parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
         name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
-        if name in self._networks:
-            network, problems = self._networks.pop(name)
-        else:
+        known = self._networks.pop(name, None)
+        if known is None:
             like = self._patterns.get(directions.tobytes())
-            network = Network(self.mesh, directions, springs.relative, springs.energies, like)
-            problems = {}
-            self._patterns.setdefault(directions.tobytes(), network)
+            known = Network(self.mesh, directions, springs.relative, springs.energies, like), {}
+            self._patterns.setdefault(directions.tobytes(), known[0])
         while len(self._networks) >= self.networks:
             self._networks.pop(next(iter(self._networks)))
-        self._networks[name] = network, problems  # the last one used is dropped last
-        return network, problems
+        self._networks[name] = known  # the last one used is dropped last
+        return known
 
     def _loading(self, load: LoadKind | Loading, follower: bool = False) -> Loading:
         return load if isinstance(load, Loading) else self.loading(load, follower)

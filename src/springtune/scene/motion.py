@@ -7,7 +7,6 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError
 
 from ..mechanics.dynamics import Motion, masses
-from ..mechanics.network import Network
 from ..problem.loads import LoadKind
 from ..springs.base import Springs
 from .mesh_cache import MeshCache
@@ -26,12 +25,8 @@ def stable_steps(
     sheet: MeshCache, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
 ) -> dict[str, float] | str:
     """Largest stable steps [s] about rest, undamped, by integrator, or why not found; `inertia` is in kg."""
-    if held is None:
-        free = np.zeros(sheet.mesh.points.shape, dtype=bool)
-        network = Network(sheet.mesh, free, springs.relative, springs.energies)
-    else:
-        network = sheet.network(held, springs)
-    motion = Motion(network, inertia / springs.reference)
+    held = np.zeros(sheet.mesh.points.shape, dtype=bool) if held is None else held
+    motion = Motion(sheet.network(held, springs), inertia / springs.reference)
     try:
         return {name: motion.step_limit(name) for name in integrators}
     except ArpackError as error:

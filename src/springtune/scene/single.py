@@ -245,17 +245,9 @@ class Scene(Tabled):
             seconds = time.perf_counter() - begin
             times = (0.0, seconds) if derived is None else (seconds, derived)
             return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.boundary_problem.none())
-        return Result(
-            self,
-            solution.equilibrium,
-            solution.status,
-            solution.message,
-            solution.negative_pivots,
-            solution.displacement,
-            time.perf_counter() - begin,
-            derived,
-            self.boundary_problem.values(springs, solution),
-        )
+        seconds, values = time.perf_counter() - begin, self.boundary_problem.values(springs, solution)
+        about = solution.equilibrium, solution.status, solution.message, solution.negative_pivots, solution.displacement
+        return Result(self, *about, seconds, derived, values)
 
     @property
     def finite_strain(self) -> bool:
@@ -414,7 +406,7 @@ class Scene(Tabled):
 
         if self.problem.given is not None:
             raise ValueError(f"load: {self.load!r} prescribes displacements, and buckling loads are of forces")
-        begin = self.boundary_problem.factor(self.springs)
+        begin = self.boundary_problem.force / self.springs.reference
         load, restriction = buckling(self.problem, begin)
         if restriction and np.isfinite(load):
             warnings.warn(restriction, AssumptionWarning, stacklevel=2)
