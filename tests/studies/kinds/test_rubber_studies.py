@@ -10,7 +10,7 @@ import pytest
 import springtune as st
 from springtune.studies.kinds.bodies import kind as bodies
 from springtune.studies.kinds.bodies.tables import like_with_like
-from springtune.studies.kinds.moduli.outputs import tables
+from springtune.studies.kinds.moduli.figures import tables
 from springtune.studies.runs.provenance import inputs
 
 from campaigns import Campaign, load_text

@@ -7,13 +7,13 @@ import pytest
 import xarray as xr
 
 from springtune.problem.compare import assured
-from springtune.studies.kinds.benchmark import outputs as benchmark
+from springtune.studies.kinds.benchmark import figures as benchmark
 from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
-from springtune.studies.kinds.moduli import outputs as definitions
+from springtune.studies.kinds.moduli import figures as definitions
 from springtune.studies.kinds.moduli.kind import KIND as MODULI
-from springtune.studies.kinds.stability import outputs as stability
+from springtune.studies.kinds.stability import figures as stability
 from springtune.studies.kinds.stability.kind import KIND as STABILITY
 from springtune.studies.output.present import write_page
 from springtune.studies.output.text import decimals, number

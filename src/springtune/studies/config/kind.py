@@ -164,8 +164,17 @@ def kinds() -> tuple[StudyKind, ...]:
 
 
 @cache
-def outputs() -> dict[str, Output]:
-    """Outputs of all study kinds, by name."""
-    apart = {name.split(".")[2]: import_name(f"{name}:OUTPUTS") for name in modules("outputs")}
-    found = [apart[name] if name in apart else import_name(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS]
-    return {output.name: output for outputs in found for output in outputs}
+def outputs(*names: str) -> dict[str, Output]:
+    """Outputs of all study kinds by name; of kinds up to those of some names, since a module ``kind`` takes long."""
+    apart, found = modules("outputs"), dict[str, Output]()
+    for kind in KINDS:
+        if names and found.keys() >= {*names}:
+            break
+        module = f"studies.kinds.{kind}.outputs"
+        own = (
+            import_name(f"{module}:OUTPUTS")
+            if module in apart
+            else import_name(f"studies.kinds.{kind}.kind:KIND").outputs
+        )
+        found |= {output.name: output for output in own}
+    return found

@@ -32,7 +32,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
             from . import style  # here: a job that only writes tables needs no matplotlib
 
             style.choose(width, font_size)
-        for output in (outputs()[name] for name in names):
+        for output in (outputs(*names)[name] for name in names):
             if output.module:
                 made += _draw(output, tree, Path(folder) / "figures")
             into = Path(folder) / output.into
@@ -84,7 +84,8 @@ COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "
 
 def write_page(tree: xr.DataTree, folder: str | Path) -> list[str]:
     """Write a CSV file for each table, and a page with all."""
-    found = (getattr(import_name(name), "tables", None) for name in modules("outputs", "tables"))
+    known = (name for name in modules("tables", "figures") if name.split(".")[2] in ("bodies", *tree.children))
+    found = (getattr(import_name(name), "tables", None) for name in known)
     tables = [table for of_kind in found if of_kind for table in of_kind(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     written["index.html"] = html(tables, tree)

@@ -207,7 +207,7 @@ def jobs(study: Study, folder: Path) -> dict[str, Job]:
     made = [(COLLECT, collect_digest(study, found), [DATASET, SUMMARY])]
     for name, members in output_jobs(study).items():
         files = [file for one in members for file in output_files(one, study)]
-        made.append((name, _present_digest(members, files), files))
+        made.append((name, _present_digest(study, members, files), files))
     made.append((BROWSE, _browse_digest(study), [PAGE]))
     for name, digest, files in made:
         products = tuple(str(folder / file) for file in files)
@@ -223,13 +223,13 @@ def collect_digest(study: Study, jobs: dict[str, Job]) -> str:
     return hash_of(study.name, inputs(study), results, code)
 
 
-def _present_digest(members: Iterable[Output], files: list[str]) -> str:
+def _present_digest(study: Study, members: Iterable[Output], files: list[str]) -> str:
     used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
         used += filter(None, (name.partition(":")[0] for name in (one.module, one.write)))
         if one.page:
-            used += modules("tables")
+            used += [name for name in modules("tables", "figures") if study.parts[name.split(".")[2]]]
             templates.append(checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 

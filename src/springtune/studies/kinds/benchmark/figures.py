@@ -1,4 +1,4 @@
-"""Figures of the benchmark: error against run time."""
+"""Figures and tables of the benchmark: error against run time."""
 
 import numpy as np
 
@@ -6,7 +6,8 @@ from springtune.problem.compare import unbeaten
 from springtune.problem.quantities import Status
 
 from ...output import style
-from ...output.dataset import choose, group
+from ...output.dataset import STATUS, choose, group, table_rows
+from . import PARTS
 
 FIRST_NAMED = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles",
                "quadratic-triangles", "boundary-elements", "tensor-mass", "calculix-cps3",
@@ -90,3 +91,28 @@ def plot_benchmark(data, ax=None, *, scene=None):
     style.plain(panel, "x", "y")
     style.add_legend(panel, [lost])
     return panel
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+CASE_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "error_percent": ("error", 100)}
+CASE_COLUMNS |= {"assured_error_percent": ("assured_error", 100), "time_ms": ("seconds", 1e3)}
+CASE_COLUMNS |= {f"{part}_ms": (f"{part}_seconds", 1e3) for part in PARTS}
+"""Columns of the table: variable and factor."""
+
+STEP_COLUMNS = {"mesh_size_mm": ("mesh_size", 1e3), "million_springs_a_second": ("spring_updates", 1e-6)}
+
+
+def tables(tree):
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
+    data = tree["benchmark"].to_dataset()
+    asked = (data.status != 0).transpose("scene", "mesh_size", "approach")
+    cases = table_rows(data, asked, ("scene", "approach", "status", "message"), CASE_COLUMNS)
+    cases = [row | {"status": STATUS[row["status"]]} for row in cases]
+    steps = table_rows(data, data.spring_updates.notnull(), ("precision", "thread_count"), STEP_COLUMNS)
+    note = "Error, and run time with its parts, meshing included: medians of warm runs."
+    about = "Nonlinear springs that explicit steps advance per second."
+    return [
+        {"stem": "benchmark", "title": "Run time against error", "note": note, "rows": cases},
+        {"stem": "explicit_steps", "title": "Explicit steps", "note": about, "rows": steps},
+    ]

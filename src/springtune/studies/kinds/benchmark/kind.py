@@ -14,11 +14,10 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
-from .outputs import OUTPUTS
 
 MOST_RUNS = 100_000
 """Most combinations of scenes, approaches and mesh sizes."""
@@ -143,6 +142,12 @@ def _code_keys(approaches):
     return springs, meshes, program() if any(name.startswith("calculix") for name in approaches) else ""
 
 
+def _figures(study):
+    return {f"benchmark_{scene}": {"scene": scene} for scene in study.parts["benchmark"]}
+
+
+FIGURES = "studies.kinds.benchmark.figures"
+
 KIND = StudyKind(
     "benchmark",
     study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error: group `/benchmark`.")},
@@ -153,6 +158,8 @@ KIND = StudyKind(
     variables=declared_variables(__file__),
     dimensions=declared_dimensions(__file__),
     stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
-    outputs=OUTPUTS,
+    outputs=(
+        Output("benchmark", "run time against error", _figures, plot=f"{FIGURES}:benchmark", shows="a benchmark"),
+    ),
     tables=lambda study: ["benchmark", "explicit_steps"] if study.parts["benchmark"] else [],
 )

@@ -1,11 +1,11 @@
-"""Figures of scenes in engines: error over the time of a frame, and sensitivity curves."""
+"""Figures and table of scenes in engines: error over the time of a frame, and sensitivity curves."""
 
 import numpy as np
 
 from springtune.problem.compare import unbeaten
 
 from ...output import style
-from ...output.dataset import choose, group, labels_of
+from ...output.dataset import choose, group, labels_of, table_rows
 from ...output.text import cell_text
 from . import RUN_ENDS, SETTING
 
@@ -146,3 +146,23 @@ def plot_engine_curves(data, ax=None, *, scene=None):
 
     title = f"{case.scene.item()}, +: the network in equilibrium{'; not drawn: ' + lost if lost else ''}"
     return style.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+ENGINE_COLUMNS = (
+    {"dt_ms": ("dt", 1e3), "displacement_mm": ("displacement", 1e3), "reference_mm": ("reference_displacement", 1e3)}
+    | {f"{name}_percent": (name, 100) for name in ("error", "definition_error", "solver_error")}
+    | {"frame_ms": ("frame_seconds", 1e3)}
+)
+"""Columns of the table: variable and factor."""
+
+
+def tables(tree):
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
+    data = tree["engines"].to_dataset()
+    names = ("scene", "definition", "engine", "precision", "substeps", "iterations", "engine_status", "message")
+    rows = table_rows(data, data.status != 0, names, ENGINE_COLUMNS)
+    rows = [row | {"engine_status": RUN_ENDS[row["engine_status"]]} for row in rows]
+    note = "Displacement at rest against finite elements: error of the definition in equilibrium, and of the solver."
+    return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

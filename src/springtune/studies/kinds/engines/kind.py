@@ -14,11 +14,10 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind
+from ...config.kind import Output, Stage, StudyKind
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, material_key, mesh_type_key, version_of
 from ...runs.plan import Task
 from . import SETTING
-from .outputs import OUTPUTS
 
 MOST_ENGINE_RUNS = 10_000
 """Most combinations of one set of runs; each takes at least a tenth of a second."""
@@ -190,6 +189,14 @@ def _tasks(study):
 
 STAGE = Stage("engines", "studies.kinds.engines.solve", _tasks, alone=True)
 
+
+def _figures(study):
+    shown = [("curves" if run.of_curve else "errors", run.labels["scene"]) for run in study.parts["engines"]]
+    return {f"engines_{name}_{scene}": {"scene": scene} for name, scene in shown}
+
+
+FIGURES = "studies.kinds.engines.figures"
+
 KIND = StudyKind(
     "engines",
     study_fields={"engines": optional(EnginesConfig, "Scenes in engines: groups `/engines` and `/engine_curves`.")},
@@ -198,6 +205,14 @@ KIND = StudyKind(
     axes=lambda runs: {"definition": {run.labels["definition"] for run in runs}},
     summary=_summary,
     stages=(STAGE,),
-    outputs=OUTPUTS,
+    outputs=(
+        Output(
+            "engines",
+            "errors over frame time and sensitivity curves in engines",
+            _figures,
+            plot=f"{FIGURES}:engines",
+            shows="scenes in engines",
+        ),
+    ),
     tables=lambda study: ["engines"] if study.parts["engines"] else [],
 )

@@ -12,10 +12,9 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
-from .outputs import OUTPUTS
 
 LOADINGS = ("pressure", "gravity", "ends")
 """Loadings: a pressure on the upper face, the weight, or ends pulled down to the floor."""
@@ -125,6 +124,8 @@ def _tasks(study):
         yield Task(values, also, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
 
 
+FIGURES = "studies.kinds.laying.figures"
+
 KIND = StudyKind(
     "laying",
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid: group `/laying`.")},
@@ -135,6 +136,8 @@ KIND = StudyKind(
     variables=declared_variables(__file__),
     dimensions=declared_dimensions(__file__),
     stages=(Stage("laying", "studies.kinds.laying.solve", _tasks),),
-    outputs=OUTPUTS,
+    outputs=(
+        Output("laying", "laid strips", lambda study: {"laying": {}}, plot=f"{FIGURES}:laying", shows="laid strips"),
+    ),
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
 )

@@ -1,6 +1,7 @@
-"""Figures that compare definitions: moduli, and errors by load."""
+"""Figures and table that compare definitions: moduli, and errors by load."""
 
 import numpy as np
+import pandas as pd
 
 from springtune.safe_io.texts import no_mathematics
 
@@ -160,3 +161,40 @@ def _default_materials(root, solved):
     full = np.flatnonzero(counts > 0.5 * counts.max() if counts.any() else counts == 0)
     order = full[np.argsort(root.material_poisson_ratio.values[full], kind="stable")]
     return root.material.values[[*dict.fromkeys((order[0], order[len(order) // 3], order[-1]))]].tolist()
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+MESH_SIZES_OVER_HEIGHT = {0.05: "up to 0.05", 0.1: "0.05 to 0.1", float("inf"): "above 0.1"}
+"""Largest mesh sizes over the height of the beam [1] of fine, middle and coarse meshes, and their texts."""
+
+TABLE_NOTE = (
+    "Lowest and highest deformation error over beams and mesh sizes. Beyond small strain a reference does not apply, "
+    "and the error is not the network's alone."
+)
+
+
+def tables(tree):
+    """Make the table of error ranges by definition, mesh type, material, load and mesh size."""
+    if "deformation_error" not in tree:
+        return []
+    root = unswept(tree.to_dataset())
+    root = root.sel(kinematics=most_requested(root, "kinematics"))
+    place = ["definition", "mesh_type", "material", "load"]
+    cells = root[["deformation_error", "status", "reference_applies"]].assign(ratio=root.mesh_size / root.beam_height)
+    frame = cells.to_dataframe([*place, "beam", "mesh_size"]).reset_index()
+    frame = frame[frame.status != 0]
+    ends = [0.0, *(end * (1 + 1e-9) for end in MESH_SIZES_OVER_HEIGHT)]
+    frame["mesh_size_over_height"] = pd.cut(frame.ratio, ends, labels=[*MESH_SIZES_OVER_HEIGHT.values()]).astype(str)
+    frame["solved"] = frame.status == 1
+    frame["beyond"] = frame.solved & (frame.reference_applies == 0)
+    frame["error"] = 100 * frame.deformation_error.where(frame.solved)
+    ranges = frame.groupby([*place, "mesh_size_over_height"], sort=False).agg(
+        scenes=("solved", "size"),
+        solved=("solved", "sum"),
+        beyond_small_strain=("beyond", "sum"),
+        lowest_error_percent=("error", "min"),
+        highest_error_percent=("error", "max"),
+    )
+    rows = ranges.reset_index().to_dict("records")
+    return [{"stem": "definitions", "title": "Definitions compared", "note": TABLE_NOTE, "rows": rows}]

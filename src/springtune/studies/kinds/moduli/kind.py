@@ -10,12 +10,11 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
 from ..bodies.kind import expected_seconds, mesh_key, mesh_source, parameters, particles
-from .outputs import OUTPUTS
 
 
 class PatchConfig(Section):
@@ -87,6 +86,17 @@ def _attributes(moduli):
     return {"comment": comment, "patch_length": moduli[0].length, "patch_height": moduli[0].height}
 
 
+def _figures(study):
+    mesh_types = dict.fromkeys(scene.mesh.mesh_type for scene in study.scenes)
+    return {"definitions_moduli": {}} | {f"definitions_loads_{name}": {"mesh_type": name} for name in mesh_types}
+
+
+def _lack(study):
+    return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
+
+
+FIGURES = "studies.kinds.moduli.figures"
+
 KIND = StudyKind(
     "moduli",
     study_fields={"patch": (PatchConfig, Field(default_factory=PatchConfig, description="Box for effective moduli."))},
@@ -99,6 +109,6 @@ KIND = StudyKind(
     dimensions=declared_dimensions(__file__),
     attributes=_attributes,
     stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),
-    outputs=OUTPUTS,
+    outputs=(Output("definitions", "comparison of definitions", _figures, plot=f"{FIGURES}:definitions", lack=_lack),),
     tables=lambda study: ["definitions"] if study.parts["moduli"] and study.scenes else [],
 )

@@ -1,9 +1,10 @@
-"""Figures of samples: which parameter matters."""
+"""Figures and table of samples: which parameter matters."""
 
 import numpy as np
 
 from ...output import style
 from ...output.dataset import choose, group, labels_of
+from . import QUANTITIES
 
 PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": "Young's modulus"}
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
@@ -93,3 +94,27 @@ def sobol(tree):
     """Yield the figure of each load: stem, plot function and selection."""
     for load in labels_of((tree["samples"].to_dataset().status != 0).any("sample"), "load"):
         yield f"sobol_{load}", plot_sobol, {"load": load}
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+
+def tables(tree):
+    """Tables of the page, see `springtune.studies.kinds.bodies.tables.tables`."""
+    if "sobol" not in tree:
+        return []
+    found = tree["sobol"].to_dataset()
+    labels = ["quantity", "load", "definition", "parameter"]
+    columns = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
+    columns.append("base_samples")
+    frame = found[columns].to_dataframe(dim_order=labels).reset_index()[[*labels, *columns]]
+    frame = frame[frame.base_samples > 0]
+    frame["definition"] = frame["definition"].mask(frame["quantity"] == "best_stiffness", "")  # one of all definitions
+    rows = frame.drop_duplicates(labels).to_dict("records")
+    first, second, third = QUANTITIES.values()
+    note = (
+        f"{first.capitalize()}, {second} and {third}: shares of their variance by each parameter alone (first order) "
+        f"and in all that it takes part in (total order). Bands: {found.attrs['bands']}. "
+        f"Failures: {found.attrs['failures']}."
+    )
+    return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": rows}]

@@ -14,14 +14,13 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
-from ...config.kind import Stage, StudyKind
+from ...config.kind import Output, Stage, StudyKind, stem
 from ...config.messages import OrSection, refuse, show, words
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import hash_of
 from ..bodies.kind import REFERENCES_OF_SHAPES
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
-from .outputs import OUTPUTS
 
 SHAPE_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
 """Keys of each distribution besides `from` and `to`."""
@@ -328,6 +327,20 @@ def _tables(study):
     return ["sobol"] if sample and sample.design == SOBOL_INDICES else []
 
 
+def _lack(study):
+    sample = study.parts["samples"]
+    if sample and sample.design != SOBOL_INDICES:
+        return f"shows Sobol indices, which the design '{sample.design}' lacks; give design: {SOBOL_INDICES}"
+    return ""
+
+
+def _figures(study):
+    sample = study.parts["samples"]
+    return {stem("sobol", {"load": load}): {"load": load} for load in sample.loads} if sample else {}
+
+
+FIGURES = "studies.kinds.samples.figures"
+
 KIND = StudyKind(
     "samples",
     study_fields={"samples": optional(SamplesConfig, "Sampled scenes: groups `/samples` and `/sobol`.")},
@@ -339,6 +352,6 @@ KIND = StudyKind(
         Stage("interpolate", INTERPOLATE, _reference_tasks, folder="samples"),
         Stage("sample", SOLVE, _block_tasks, folder="samples"),
     ),
-    outputs=OUTPUTS,
+    outputs=(Output("sobol", "Sobol indices", _figures, plot=f"{FIGURES}:sobol", shows="sampled scenes", lack=_lack),),
     tables=_tables,
 )

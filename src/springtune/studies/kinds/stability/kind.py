@@ -10,11 +10,13 @@ from springtune.mesh.cells import MESH_TYPES
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_density, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import AXES, DEFINITION_FREE, EXPERIMENTS
-from .outputs import OUTPUTS, STABILITY_TABLES
+
+TABLES = ("limits", "rest", "slivers", "strains", "perturbation", "buckling")
+"""Experiments with a table, see `springtune.studies.kinds.stability.figures`."""
 
 ExperimentName = Annotated[str, *one_of("experiment", EXPERIMENTS)]
 
@@ -79,7 +81,7 @@ def _expand(config, declared):
 
 def _tables(study):
     asked = {name for name, _ in study.parts["stability"]}
-    return [f"stability_{name}" for name in STABILITY_TABLES if name in asked]
+    return [f"stability_{name}" for name in TABLES if name in asked]
 
 
 def _axes(experiments):
@@ -94,6 +96,13 @@ def _tasks(study):
         yield Task(values, also, {"experiment": name, "definition": definition}, seconds=3.0)
 
 
+def _figures(study):
+    asked = {name for name, _ in study.parts["stability"]}
+    return {f"stability_{name}": {} for name in ("maps", "strains") if name in asked}
+
+
+FIGURES = "studies.kinds.stability.figures"
+
 KIND = StudyKind(
     "stability",
     study_fields={"stability": optional(StabilityConfig, "Experiments on numerical stability: group `/stability`.")},
@@ -106,6 +115,8 @@ KIND = StudyKind(
     flags={"behaviour": BEHAVIOURS},
     sparse=True,
     stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
-    outputs=OUTPUTS,
+    outputs=(
+        Output("stability", "experiments on stability", _figures, plot=f"{FIGURES}:stability", shows="experiments"),
+    ),
     tables=_tables,
 )
