@@ -133,11 +133,6 @@ class OutlineSide:
             raise ValueError(f"{about}: turns by no angle; correct the centre, or leave it out for a straight side")
         return across, along, begin, turn
 
-    @property
-    def circular(self) -> bool:
-        """Whether it is an arc of a circle."""
-        return self.arc is not None and self.arc[0] == self.arc[1]
-
     def at(self, parameter: float) -> Point:
         """Point at a parameter [m]."""
         if parameter in (0.0, 1.0):
@@ -157,33 +152,22 @@ class OutlineSide:
         angle = begin + parameter * turn
         return -across * turn * math.sin(angle), along * turn * math.cos(angle)
 
-    def tangent(self, parameter: float) -> Point:
-        """Unit vector along the side at a parameter."""
-        x, y = self.slope(parameter)
-        norm = math.hypot(x, y)
-        return x / norm, y / norm
-
-    @cached_property
-    def length(self) -> float:
-        """Length [m]."""
-        if self.arc is None:
-            return math.dist(self.start, self.end)
-        return self.arc[0] * abs(self.arc[3]) if self.circular else self.length_to(1.0)
-
     def length_to(self, parameter: float) -> float:
         """Length from the start to a parameter [m], of an ellipse by an elliptic integral."""
-        if self.arc is None or self.circular:
-            return parameter * self.length
+        if self.arc is None:
+            return parameter * math.dist(self.start, self.end)
+        across, along, begin, turn = self.arc
+        if across == along:
+            return parameter * (across * abs(turn))
         from scipy.special import ellipeinc  # here, since few outlines have ellipses
 
-        across, along, begin, turn = self.arc
         first, last = ellipeinc([begin, begin + parameter * turn], 1 - (across / along) ** 2)
         return float(along * abs(last - first))
 
     def parameter_of(self, length: float) -> float:
         """Parameter at a length from the start along the side [m]."""
-        if self.arc is None or self.circular:
-            return length / self.length
+        if self.arc is None or self.arc[0] == self.arc[1]:
+            return length / self.length_to(1.0)
         from scipy.optimize import brentq  # here, as above
 
         return float(brentq(lambda parameter: self.length_to(parameter) - length, 0.0, 1.0, xtol=1e-16))

@@ -714,8 +714,8 @@ class Shape:
             if short:
                 raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
             for before, side in zip((one[-1], *one[:-1]), one):
-                (x, y), (u, v) = before.tangent(1.0), side.tangent(0.0)
-                if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6:
+                (x, y), (u, v) = before.slope(1.0), side.slope(0.0)
+                if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6 * math.hypot(x, y) * math.hypot(u, v):
                     raise ValueError(f"{what}: turns back on itself at {in_words(side.start)}; move a corner")
         if met := find_meeting([one for _, one in rounds]):
             (first, i), (second, j), where = met

@@ -444,7 +444,7 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
             continue
         ends = mesh.points[grouped.sides[name]]
         away = np.min([_distances(side, ends.reshape(-1, 2)) for side in own], axis=0)
-        share = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / sum(side.length for side in own)
+        share = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / sum(side.length_to(1.0) for side in own)
         if away.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + MOST_DISTANCE_FROM_SIDE:
             raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of {what}; {remedy}")
     for name, point in shape.points.items():
