@@ -4,6 +4,7 @@ import os
 import re
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, TextIO, cast
@@ -20,6 +21,15 @@ def examples(*lines: str) -> str:
     """Epilog of a command with examples, which click shows verbatim."""
     folder = "" if is_source_tree(Path()) else "config/"  # where `springtune new` writes
     return "\n".join(["\b", "Examples:", *(f"  {line.replace(folder, '')}" for line in lines)])
+
+
+def command(*lines: str, **settings: Any) -> Callable[..., click.Command]:
+    """Decorator that makes a command, whose help ends with examples."""
+    return click.command(epilog=examples(*lines), **settings)
+
+
+PATH: click.Path = click.Path(path_type=Path)
+"""Type of options and arguments that are paths."""
 
 
 class WrongCall(click.ClickException):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import examples, options
+from . import PATH, command, options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -61,19 +61,17 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
 """Text of an answer, and a function that makes the springs that it recommends."""
 
 
-@click.command(
-    epilog=examples(
-        'springtune predict --beam 200x40 --size "2 mm" --material steel',
-        'springtune predict --beam 200x40 --error "1 %" --load traction,bending --material steel',
-        'springtune predict --beam 200x40 --error "2 %" --material steel --mesh structured,free --springs-alone '
-        "--write net.csv",
-        'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
-        'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
-        'springtune predict --study config/shapes.yaml:cook --load shear --size "2 mm" --material third',
-        'springtune predict --study config/shapes.yaml:cook --material third --error "2 %"',
-        'springtune predict --engine xpbd --dt 1/60 --substeps 20 --iterations 10 --beam 200x40 --size "13 mm" '
-        '--material rubber --density "1000 kg/m^3" --load traction --force "0.2 N"',
-    )
+@command(
+    'springtune predict --beam 200x40 --size "2 mm" --material steel',
+    'springtune predict --beam 200x40 --error "1 %" --load traction,bending --material steel',
+    'springtune predict --beam 200x40 --error "2 %" --material steel --mesh structured,free --springs-alone '
+    "--write net.csv",
+    'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
+    'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
+    'springtune predict --study config/shapes.yaml:cook --load shear --size "2 mm" --material third',
+    'springtune predict --study config/shapes.yaml:cook --material third --error "2 %"',
+    'springtune predict --engine xpbd --dt 1/60 --substeps 20 --iterations 10 --beam 200x40 --size "13 mm" '
+    '--material rubber --density "1000 kg/m^3" --load traction --force "0.2 N"',
 )
 @options.sheet_options(
     "A mesh type, or a mesh file; with --error mesh types, such as structured,free.  "
@@ -160,7 +158,7 @@ def _answer_for_mesh(body: options.BodyOptions, under: dict[str, Any], springs_a
     found = [choice for choice in found if not (springs_alone and choice.energies)]
     best, _ = recommended(found)
     none = partial(_refuse, "nothing is recommended for this mesh, so nothing is written; take another mesh")
-    make = partial(_net, body, best.definition, loads=under.get("loads")) if best else none
+    make = partial(_net, body, definition=best.definition, loads=under.get("loads")) if best else none
     return prediction_text(_subject(body, known), body.mesh_name, counts, found), make
 
 
@@ -181,7 +179,7 @@ def _answer_for_error(
     if mesh := best or next(reversed(search.tried), None):
         body = replace(body, mesh_type=mesh.mesh_type, size=mesh.size)
     none = partial(_refuse, f"no mesh keeps {error}, so nothing is written; allow a larger error")
-    make = partial(_net, body, best.choice.definition, loads=under.get("loads")) if best else none
+    make = partial(_net, body, definition=best.choice.definition, loads=under.get("loads")) if best else none
     return search_text(_subject(body, search.known), search, springs_alone), make
 
 
@@ -219,15 +217,13 @@ def _refuse(why: str) -> "SpringNet":
 # -- springs for other programs ---------------------------------------------------------------------------------------
 
 
-@click.command(
-    epilog=examples(
-        'springtune springs --beam 200x40 --size "5 mm" --material steel --definition patch --out net.csv',
-        'springtune springs --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber --out net.vtu',
-        'springtune springs --beam 200x40 --size "5 mm" --material steel --density "7850 kg/m^3" --load traction '
-        '--force "400 kN" --out net.json',
-        'springtune springs --study config/shapes.yaml:hole --size "2 mm" --material steel --density "7850 kg/m^3" '
-        "--definition lattice --out hole.xml",
-    )
+@command(
+    'springtune springs --beam 200x40 --size "5 mm" --material steel --definition patch --out net.csv',
+    'springtune springs --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber --out net.vtu',
+    'springtune springs --beam 200x40 --size "5 mm" --material steel --density "7850 kg/m^3" --load traction '
+    '--force "400 kN" --out net.json',
+    'springtune springs --study config/shapes.yaml:hole --size "2 mm" --material steel --density "7850 kg/m^3" '
+    "--definition lattice --out hole.xml",
 )
 @options.sheet_options("A mesh type, or a mesh file.", "for masses, and the largest stable time steps", "structured")
 @click.option(
@@ -241,15 +237,7 @@ def _refuse(why: str) -> "SpringNet":
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
 @options.target_option("--out", "File, replaced if it is there", required=True)
-def springs(
-    sheet: dict[str, Any],
-    definition: str,
-    stiffness: str | None,
-    load: str | None,
-    force: str | None,
-    scale: float,
-    target: Path,
-) -> None:
+def springs(sheet: dict[str, Any], load: str | None, target: Path, **how: Any) -> None:
     """Write the springs of a mesh to a file: rest lengths, stiffnesses, masses, and energies besides springs.
 
     The file also has the definition with its formula and source, and the network's errors on this mesh: under traction,
@@ -258,7 +246,7 @@ def springs(
     from ..handover.simulation import EquilibriumWarning
     from .recommendation import written_text
 
-    net = _net(options.read_body(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
+    net = _net(options.read_body(sheet, load), **how)
     with options.file_errors("--out", target), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)
         written = net.write(target)
@@ -268,28 +256,21 @@ def springs(
 
 
 def _net(
-    body: options.BodyOptions,
-    definition: str,
-    *,
-    loads: Any = None,
-    stiffness: str | None = None,
-    force: str | None = None,
-    scale: float = 1.0,
+    body: options.BodyOptions, loads: Any = None, force: str | None = None, scale: float = 1.0, **how: Any
 ) -> "SpringNet":
-    """Springs of a mesh, with a load if given; `scale` [1] multiplies the load of a shape."""
+    """Springs of a mesh, with a load if given; `scale` [1] multiplies the load of a shape, `how` has the definition."""
     from ..handover.net import SpringNet
     from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
-    name, how = body.mesh_name, dict[str, Any](definition=definition, stiffness=stiffness)
     try:
         if body.load is None or loads:
-            how |= {"beam": body.body, "mesh_name": name, "loads": loads}
+            how |= {"beam": body.body, "mesh_name": body.mesh_name, "loads": loads}
             return SpringNet.from_mesh(body.mesh, body.material, **how)
         scene = Scene(body.body, body.mesh, body.material, body.load, force, scale=scale, **how)
-        return SpringNet.from_scene(scene, name)
+        return SpringNet.from_scene(scene, body.mesh_name)
     except SingularError as error:  # of the patch test that scales them
-        why = f"'{definition}' has no springs on this mesh: {error}; take another"
+        why = f"'{how['definition']}' has no springs on this mesh: {error}; take another"
         raise click.ClickException(f"--definition: {why}") from None
 
 
@@ -299,14 +280,12 @@ TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "shift", "f
 """Keys of a test in a list of tests; all but the file are options, too."""
 
 
-@click.command(
-    epilog=examples(
-        "springtune identify pull.csv --beam 100x20 --load traction",
-        'springtune identify dic.csv --beam 100x20 --load traction --force "400 N"',
-        "springtune identify tests.yaml --law orthotropic",
-    )
+@command(
+    "springtune identify pull.csv --beam 100x20 --load traction",
+    'springtune identify dic.csv --beam 100x20 --load traction --force "400 N"',
+    "springtune identify tests.yaml --law orthotropic",
 )
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--law", default="isotropic", show_default=True, help="isotropic, orthotropic, regions.")
 @click.option("--known", multiple=True, help="A constant that is known, such as nu=0.3; may be repeated.")
 @click.option("--beam", help="Length x height in mm, such as 100x20.")

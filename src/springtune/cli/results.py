@@ -12,7 +12,7 @@ from ..registry import how_to_install
 from ..safe_io.texts import aligned, clipped, shown
 from ..studies.output.text import bytes_text, cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER, workflow_folder
-from . import WrongCall, examples
+from . import PATH, WrongCall, command
 
 if TYPE_CHECKING:
     from ..studies.output.comparison import Change, Comparison, GroupChanges
@@ -23,8 +23,8 @@ ROWS = 20
 COMPARED = ("before", "after")
 
 
-@click.command(epilog=examples("springtune info results/paper", "springtune info dataset.nc --study > again.yaml"))
-@click.argument("path", type=click.Path(path_type=Path))
+@command("springtune info results/paper", "springtune info dataset.nc --study > again.yaml")
+@click.argument("path", type=PATH)
 @click.option("--study", is_flag=True, help="Print the study that made the dataset, and nothing else.")
 def info(path: Path, study: bool) -> None:
     """Show a dataset's scenes by status, errors, groups, versions and inputs.
@@ -42,14 +42,12 @@ def info(path: Path, study: bool) -> None:
     click.echo(summing_up.info(path))
 
 
-@click.command(
-    epilog=examples(
-        "springtune export results/paper --to cells.csv",
-        "springtune export results/paper --group sensitivity --to curves.parquet",
-    )
+@command(
+    "springtune export results/paper --to cells.csv",
+    "springtune export results/paper --group sensitivity --to curves.parquet",
 )
-@click.argument("path", type=click.Path(path_type=Path))
-@click.option("--to", "target", required=True, type=click.Path(path_type=Path), help="File: .csv or .parquet.")
+@click.argument("path", type=PATH)
+@click.option("--to", "target", required=True, type=PATH, help="File: .csv or .parquet.")
 @click.option("--group", default="/", show_default=True, help="Group of the table, such as sensitivity.")
 @click.option("--force", is_flag=True, help="Replace the file if it is there.")
 def export(path: Path, target: Path, group: str, force: bool) -> None:
@@ -64,8 +62,8 @@ def export(path: Path, target: Path, group: str, force: bool) -> None:
         click.echo(write(tree, target, group, force))
 
 
-@click.command(epilog=examples("springtune browse results/paper"))
-@click.argument("path", type=click.Path(path_type=Path))
+@command("springtune browse results/paper")
+@click.argument("path", type=PATH)
 def browse(path: Path) -> None:
     """Open the page of a study's results in a browser, and print its path.
 
@@ -78,9 +76,9 @@ def browse(path: Path) -> None:
     click.launch(str(page))
 
 
-@click.command(epilog=examples("springtune archive results/paper", "springtune archive results/paper --out paper.zip"))
-@click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Zip file to write.  [default: results/<study>.crate.zip]")
+@command("springtune archive results/paper", "springtune archive results/paper --out paper.zip")
+@click.argument("folder", type=PATH)
+@click.option("--out", type=PATH, help="Zip file to write.  [default: results/<study>.crate.zip]")
 @click.option("--force", is_flag=True, help="Replace a file that is there.")
 def archive(folder: Path, out: Path | None, force: bool) -> None:
     """Pack the results of a study into one zip file for others.
@@ -107,7 +105,7 @@ def archive(folder: Path, out: Path | None, force: bool) -> None:
     click.echo(f"{target}: {len(names)} files, {bytes_text(target.stat().st_size)}")
 
 
-@click.command(epilog=examples("springtune docs"))
+@command("springtune docs")
 def docs() -> None:
     """Print where the pages, the manual of studies and the examples are."""
     places = {"pages": "docs/README.md", "keys of a study": "config/README.md", "examples": "examples"}
@@ -117,11 +115,9 @@ def docs() -> None:
 # -- diff --------------------------------------------------------------------------------------------------------------
 
 
-@click.command(
-    epilog=examples(
-        "springtune diff results/before results/mine",
-        "springtune diff before.nc results/mine --relative 1e-3 --group sensitivity",
-    )
+@command(
+    "springtune diff results/before results/mine",
+    "springtune diff before.nc results/mine --relative 1e-3 --group sensitivity",
 )
 @click.argument("before")
 @click.argument("after")
@@ -135,13 +131,7 @@ def docs() -> None:
 @click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
 @click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
 def diff(
-    before: str,
-    after: str,
-    relative: float,
-    absolute: float | None,
-    groups: tuple[str, ...],
-    ignored: tuple[str, ...],
-    rows: int,
+    before: str, after: str, relative: float, absolute: float | None, rows: int, **chosen: tuple[str, ...]
 ) -> None:
     """List the values that differ between two datasets by more than a tolerance.
 
@@ -158,8 +148,7 @@ def diff(
     try:
         paths = [reading.dataset_file(before), reading.dataset_file(after)]
         with reading.open(paths[0]) as one, reading.open(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
-            given = Tolerance(relative, absolute)
-            found = compare(one, other, given, groups, ignored, rows)
+            found = compare(one, other, Tolerance(relative, absolute), most=rows, **chosen)
             click.echo(comparison_text(found, paths, rows))
     except (OSError, ValueError) as error:
         raise WrongCall(shown(error)) from None
@@ -175,25 +164,18 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int = ROWS
     parts[0].append(_summary(found, sum(one.changed for _, one in changed)))
     parts += [part for group in found.groups for part in _alone(group, most)]
     if changed:
-        counts = [["  variable", "cells", "changed", "largest change"]]
+        counts: list[list[object]] = [["  variable", "cells", "changed", "largest change"]]
         for name, one in changed:
             largest = next((row for row in one.rows if math.isfinite(row.difference)), one.rows[0])
-            counts.append(
-                [f"  {variable_name(name, one.name)}", str(one.compared), str(one.changed), _difference(largest)]
-            )
+            counts.append([f"  {variable_name(name, one.name)}", one.compared, one.changed, _difference(largest)])
         flags = [row for group in found.groups for one in group.flags for row in one.rows]
-        rows = [
-            [
-                f"  {variable_name(row.group, row.variable)}",
-                *(_value(row.before), _value(row.after), _difference(row)),
-                _place(groups[row.group], row.labels),
-            ]
-            for row in [*flags[:most], *found.changes[:most]]
-        ]
+        rows = [["  variable", *COMPARED, "change", "at"]]
+        for row in [*flags[:most], *found.changes[:most]]:
+            values = _value(row.before), _value(row.after), _difference(row)
+            rows.append([f"  {variable_name(row.group, row.variable)}", *values, _place(groups[row.group], row.labels)])
         parts.append(["values that changed", *aligned(counts, 0, (1, 2)).splitlines()])
-        table = aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines()
-        more = _more(sum(one.changed for _, one in changed) - len(rows))
-        parts.append(["the largest changes, measured by the tolerance", *table, *more])
+        table, more = aligned(rows, 0, (1, 2, 3)), _more(sum(one.changed for _, one in changed) + 1 - len(rows))
+        parts.append(["the largest changes, measured by the tolerance", *table.splitlines(), *more])
     if found.attributes:
         told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
         parts.append(["attributes that differ; they are no results", *aligned(told, 0).splitlines()])

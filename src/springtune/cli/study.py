@@ -20,7 +20,7 @@ from ..registry import NAME, NAME_RULE, how_to_install
 from ..safe_io.files import write_bytes, write_text
 from ..safe_io.texts import aligned
 from ..studies.runs.source import CONFIG_FOLDER, TASKS, USUAL_STUDY, config_file, is_source_tree, workflow_folder
-from . import WrongCall, examples
+from . import PATH, WrongCall, command
 
 if TYPE_CHECKING:
     from ..studies.config.model import Study
@@ -29,13 +29,11 @@ MANUAL = "`springtune docs` prints where every key is explained"
 """Comment in new studies."""
 
 
-@click.command(
-    epilog=examples(
-        "springtune new mine",
-        "springtune new studies/mine.yaml",
-        "springtune new plate --shape",
-        "springtune new tables --from paper",
-    )
+@command(
+    "springtune new mine",
+    "springtune new studies/mine.yaml",
+    "springtune new plate --shape",
+    "springtune new tables --from paper",
 )
 @click.argument("study")
 @click.option("--shape", is_flag=True, help="A study of a shape, an outline with a hole, rather than of a beam.")
@@ -91,9 +89,7 @@ def _copy(name: str, path: Path) -> None:
 def _path(given: str) -> Path:
     """Path of a new study."""
     path = Path(given)
-    if path.suffix not in (".yaml", ".yml"):
-        if not path.name:
-            return path
+    if path.name and path.suffix not in (".yaml", ".yml"):
         path = path.with_name(f"{path.name}.yaml")
         path = CONFIG_FOLDER / path if given == path.stem and is_source_tree(Path()) else path
     return path
@@ -120,11 +116,9 @@ def schema_line(path: Path) -> str:
     return f"# yaml-language-server: $schema={schema}"
 
 
-@click.command(
-    epilog=examples("springtune scenes config/mine.yaml", "SPRINGTUNE_MAX_SCENES=2e6 springtune scenes large.yaml")
-)
-@click.argument("config", type=click.Path(path_type=Path))
-@click.option("--results", type=click.Path(path_type=Path), default=".", help="Folder in which results/ is.")
+@command("springtune scenes config/mine.yaml", "SPRINGTUNE_MAX_SCENES=2e6 springtune scenes large.yaml")
+@click.argument("config", type=PATH)
+@click.option("--results", type=PATH, default=".", help="Folder in which results/ is.")
 def scenes(config: Path, results: Path) -> None:
     """List a study's scenes, what they share and what is stored, without running it.
 
@@ -166,7 +160,7 @@ def _stored_text(study: "Study", folder: Path) -> str:
     return f"stored in {folder}: {counts}; {new}"
 
 
-@click.command(epilog=examples("springtune definitions | grep area"))
+@command("springtune definitions | grep area")
 def definitions() -> None:
     """List the definitions of spring stiffness."""
     from .. import DEFINITIONS
@@ -182,13 +176,11 @@ def definitions() -> None:
 # -- run ---------------------------------------------------------------------------------------------------------------
 
 
-@click.command(
-    epilog=examples(
-        "springtune run config/mine.yaml",
-        "springtune run config/mine.yaml --cores 4",
-        "springtune run config/mine.yaml -n",
-        "springtune run config/mine.yaml --workflow-profile slurm",
-    ),
+@command(
+    "springtune run config/mine.yaml",
+    "springtune run config/mine.yaml --cores 4",
+    "springtune run config/mine.yaml -n",
+    "springtune run config/mine.yaml --workflow-profile slurm",
     context_settings={"ignore_unknown_options": True},
     options_metavar="[--results FOLDER]",
 )
@@ -268,12 +260,9 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
 def set_cache() -> None:
     """Set a cache folder here for Snakemake if the user's cannot be written."""
     usual = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
-    try:
+    with suppress(OSError):
         usual.mkdir(parents=True, exist_ok=True)
-        written = os.access(usual, os.W_OK)
-    except OSError:
-        written = False
-    if not written:
+    if not os.access(usual, os.W_OK):
         os.environ["XDG_CACHE_HOME"] = str(Path(".snakemake/cache").absolute())
         click.echo(f"note: {usual} cannot be written; .snakemake/cache stands in for it", err=True)
 

@@ -12,8 +12,7 @@ from ..handover.simulation import FORMULAS, network_of
 from ..mechanics import BackwardEuler
 from ..mechanics.dynamics import Motion
 from ..mechanics.stepping import make_stepper
-from .base import Setting, engine
-from .textbook import energy_parameters
+from .base import Setting, energy_parameters, engine
 
 TOLERANCE = 1e-5
 """Relative residual that ends conjugate gradients: SOFA's default."""

@@ -12,8 +12,7 @@ springs of ``ln(1 + k w h^2) / w``, a linear net rests where ``(exp(A) - 1) u = 
 import numpy as np
 
 from ..handover.net import SpringNet
-from .base import Parameter, Setting, engine
-from .textbook import Textbook, project_springs, refuse_pushing_springs
+from .base import Parameter, Setting, Textbook, engine, project_springs, refuse_pushing_springs
 
 
 def shares(net: SpringNet, setting: Setting) -> np.ndarray:

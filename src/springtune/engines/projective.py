@@ -13,8 +13,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from ..handover.net import SpringNet
 from ..linalg.factors import SUPERLU
 from ..linalg.kernels import compiled
-from .base import Setting, engine
-from .textbook import Textbook, refuse_pushing_springs, spring_between, stretch_spring
+from .base import Setting, Textbook, engine, refuse_pushing_springs, spring_between, stretch_spring
 
 
 @compiled

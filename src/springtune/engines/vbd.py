@@ -17,8 +17,7 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..linalg.kernels import compiled
 from ..mesh.cells import no_cells
-from .base import Setting, engine
-from .textbook import Textbook, energy_parameters, refuse_pushing_springs
+from .base import Setting, Textbook, energy_parameters, engine, refuse_pushing_springs
 
 
 @compiled

@@ -15,8 +15,7 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
 from ..linalg.kernels import compiled
-from .base import EngineError, Parameter, Setting, engine
-from .textbook import Textbook, project_springs
+from .base import EngineError, Parameter, Setting, Textbook, engine, project_springs
 
 BLOCK_KINDS = tuple(COMPLIANCE_UNITS)
 """Kinds of blocks, by their numbers here."""
