@@ -147,11 +147,7 @@ class TestRun:
         """Folders and commands that Snakemake would be called by."""
         found = []
 
-        def execute(program, command):
-            found.append((Path.cwd(), command))
-            raise SystemExit(0)
-
-        monkeypatch.setattr("os.execv", execute)
+        monkeypatch.setattr("snakemake.cli.main", lambda arguments: found.append((Path.cwd(), arguments)))
         return found
 
     @pytest.mark.parametrize("folder", ["", "of mine"], ids=["here", "elsewhere"])

@@ -242,7 +242,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
         outdated = _outdated(studies, "a run makes it again")
         forced = ["--forcerun", *map(str, outdated)] if outdated else []
     elif _computes(options):
-        _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
+        _unlock(studies, [*workflow, "--unlock", f"--configfile={path}"])
         found = _outdated(studies, "it is made again")
         for record in found or {}:
             record.unlink()
@@ -253,8 +253,10 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
             return
     # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
     # begins with - is not an option behind =.
-    command = [*_snakemake(), *forced, *workflow, *options, f"--configfile={path}"]
-    os.execv(command[0], command)
+    from snakemake.cli import main as snakemake  # here, since it takes half a second
+
+    sys.argv = ["snakemake", *forced, *workflow, *options, f"--configfile={path}"]
+    snakemake(sys.argv[1:])
 
 
 def set_cache() -> None:
@@ -302,7 +304,7 @@ def _results(study: "Study") -> Path:
     return Path("results") / study.name
 
 
-def _unlock(studies: "list[Study]", command: list[str]) -> None:
+def _unlock(studies: "list[Study]", options: list[str]) -> None:
     """Remove the lock of a killed run; refuse a study under computation, a read-only folder and a full disk."""
     from ..studies.runs import locks
 
@@ -316,7 +318,7 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
         raise click.ClickException(f"{here}: the disk is full; make room, then call the same command again")
     killed = [one.name for one in studies if locks.check_idle(_results(one))]
     if killed:
-        subprocess.run(command, check=False, capture_output=True)
+        subprocess.run([sys.executable, "-m", "snakemake", *options], check=False, capture_output=True)
         which = ", ".join(str(Path("results", name)) for name in killed)
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
@@ -350,9 +352,3 @@ def _suggestion(path: Path) -> str:
         return ""
     copied = f"`springtune new {path.stem} --from {path.stem}` writes it here"
     return f"; {copied}" if near.is_absolute() else f"; did you mean {near}?"
-
-
-def _snakemake() -> list[str]:
-    """Command of Snakemake on this Python."""
-    beside = Path(sys.executable).with_name("snakemake")
-    return [str(beside)] if beside.exists() else [sys.executable, "-m", "snakemake"]

@@ -126,7 +126,8 @@ def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, flo
 def magnification(fields: "xr.Dataset") -> float:
     """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
     places = np.concatenate([plane_vectors(fields, "{}"), plane_vectors(fields, "outline_{}")])
-    sizes = (np.hypot(*plane_vectors(fields, name).T) for name in ("reference_displacement_{}", "displacement_{}"))
+    names = ("reference_displacement", "displacement")
+    sizes = (np.hypot(fields[f"{name}_x"].values, fields[f"{name}_y"].values) for name in names)
     largest = next(filter(None, (np.max(size, where=np.isfinite(size), initial=0.0) for size in sizes)), 0.0)
     factor = 0.07 * max(extent(places, (0.0, 0.0))) / largest if largest else 0.0
     if not factor or 0.4 < factor < 2:
