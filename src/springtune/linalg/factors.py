@@ -7,14 +7,19 @@ CHOLMOD comes with the extra package cvxopt. Without it, or with the environment
 import os
 from collections.abc import Sequence
 from functools import cached_property
-from importlib.util import find_spec
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, sparray
 from scipy.sparse.linalg import splu
 
-CHOLESKY = find_spec("cvxopt") is not None and os.environ.get("SPRINGTUNE_SOLVER") != "superlu"
+try:
+    import cvxopt
+    from cvxopt import cholmod
+except ImportError:
+    cholmod = None
+
+CHOLESKY = cholmod is not None and os.environ.get("SPRINGTUNE_SOLVER") != "superlu"
 """Whether CHOLMOD is available and the default."""
 
 SUPERLU: dict[str, Any] = {"relax": 4, "panel_size": 4, "options": {"SymmetricMode": True}}
@@ -85,22 +90,18 @@ class Analysis:
     """
 
     def __init__(self, indices: np.ndarray, pointers: np.ndarray, order: np.ndarray | None = None) -> None:
-        from cvxopt import cholmod, matrix, spmatrix
-
         size = len(pointers) - 1
         columns = np.repeat(np.arange(size), np.diff(pointers))
         self._lower = np.flatnonzero(indices >= columns)
-        rows, columns = (matrix(part[self._lower].astype(np.int64)) for part in (indices, columns))
-        self._matrix = spmatrix(np.zeros(len(self._lower)), rows, columns, (size, size))
-        self._order = {} if order is None else {"p": matrix(order.astype(np.int64))}
+        rows, columns = (cvxopt.matrix(part[self._lower].astype(np.int64)) for part in (indices, columns))
+        self._matrix = cvxopt.spmatrix(np.zeros(len(self._lower)), rows, columns, (size, size))
+        self._order = {} if order is None else {"p": cvxopt.matrix(order.astype(np.int64))}
         self.spare: list[Any] = []
         cholmod.options["supernodal"] = 2
 
     def factorize(self, data: np.ndarray) -> "CholeskyFactor | None":
         """Factorize the matrix of these entries (n_entries,); None if it is not positive definite."""
-        from cvxopt import cholmod, matrix
-
-        self._matrix.V = matrix(data[self._lower])
+        self._matrix.V = cvxopt.matrix(data[self._lower])
         # A factor is made in the place of its symbolic one, and gives that back when nobody needs it any more.
         factor = self.spare.pop() if self.spare else cholmod.symbolic(self._matrix, uplo="L", **self._order)
         try:
@@ -109,6 +110,10 @@ class Analysis:
             self.spare.append(factor)
             return None
         return CholeskyFactor(factor, self.spare, self._matrix.size[0])
+
+
+LOWER_HALF, UPPER_HALF = (7, 4), (5, 8)
+"""CHOLMOD's systems with a permutation and the lower triangular factor, and with their transposes."""
 
 
 class CholeskyFactor:
@@ -123,12 +128,11 @@ class CholeskyFactor:
     def __del__(self) -> None:
         self._spare.append(self._factor)
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solution of the factorized system, shape (unknowns,) or (unknowns, n)."""
-        from cvxopt import cholmod, matrix
-
-        solution = matrix(right)
-        cholmod.solve(self._factor, solution)
+    def solve(self, right: np.ndarray, systems: Sequence[int] = (0,)) -> np.ndarray:
+        """Solution of the factorized system, shape (unknowns,) or (unknowns, n), or of CHOLMOD's `systems` in turn."""
+        solution = cvxopt.matrix(right)
+        for system in systems:
+            cholmod.solve(self._factor, solution, sys=system)
         return np.array(solution).reshape(right.shape)
 
     step = estimate = solve
@@ -136,32 +140,12 @@ class CholeskyFactor:
     @property
     def least_pivot(self) -> float:
         """Smallest pivot."""
-        from cvxopt import cholmod
-
         return float(np.array(cholmod.diag(self._factor)).min(initial=np.inf)) ** 2
 
-    def lower(self, right: np.ndarray) -> np.ndarray:
-        """First half of a solution, with the lower triangular factor, in the order of elimination."""
-        return self._halved(right, 7, 4)
-
-    def upper(self, right: np.ndarray) -> np.ndarray:
-        """The other half, with its transpose, of what `lower` gives."""
-        return self._halved(right, 5, 8)
-
-    def _halved(self, right: np.ndarray, *systems: int) -> np.ndarray:
-        from cvxopt import cholmod, matrix
-
-        solution = matrix(right)
-        for system in systems:
-            cholmod.solve(self._factor, solution, sys=system)
-        return np.array(solution).ravel()
-
     def lower_columns(self, unknowns: np.ndarray) -> csc_array:
-        """Few entries each: what `lower` gives for a unit load at each of n unknowns, shape (unknowns, n)."""
-        from cvxopt import cholmod, matrix, spmatrix
-
+        """Few entries each: `LOWER_HALF` of the solution for a unit load at each of n unknowns, (unknowns, n)."""
         size, count = self._size, len(unknowns)
-        units = spmatrix(1.0, matrix(unknowns), matrix(np.arange(count)), (size, count))
+        units = cvxopt.spmatrix(1.0, cvxopt.matrix(unknowns), cvxopt.matrix(np.arange(count)), (size, count))
         found = cholmod.spsolve(self._factor, cholmod.spsolve(self._factor, units, sys=7), sys=4)
         pointers, indices, data = (np.array(part).ravel() for part in found.CCS)
         return csc_array((data, indices, pointers), shape=(size, count))
@@ -209,7 +193,7 @@ class PinnedFactor:
         self._size = float(np.abs(matrix.data).max())
         # Of the mode next to zero, w = P^-1 E v: what the factor leaves of E v moves the eigenvalue by its work on w.
         least = np.abs(values).argmin()
-        mode = factor.upper(self._columns @ vectors[:, least])
+        mode = factor.solve(self._columns @ vectors[:, least], UPPER_HALF)
         left = -(matrix @ mode)
         left[pins] += vectors[:, least] - stiffness * mode[pins]
         error = abs(mode @ left) + np.finfo(float).eps * self._size * (mode @ mode)
@@ -234,8 +218,8 @@ class PinnedFactor:
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """Solve for one right-hand side without a correction."""
-        half = self._factor.lower(right)
-        return self._factor.upper(half + self._columns @ (self._inverse @ (self._columns.T @ half)))
+        half = self._factor.solve(right, LOWER_HALF)
+        return self._factor.solve(half + self._columns @ (self._inverse @ (self._columns.T @ half)), UPPER_HALF)
 
 
 def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np.ndarray]) -> PinnedFactor | None:

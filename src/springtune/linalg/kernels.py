@@ -98,22 +98,28 @@ def multiply(
 
 @compiled
 def advance(
-    first: int, last: int, matrix: Chunks, length: float, u: Field, forces: Field, solution: Field, residual: Field
+    first: int,
+    last: int,
+    matrix: Chunks,
+    length: float,
+    u: Field,
+    forces: Field,
+    solution: Field,
+    residual: Field,
+    scale: float,
+    right: Field,
+    squares: Field,
 ) -> None:
-    """Step along `u`: add it to the solution, and take its forces off the residual."""
-    for i in range(matrix.starts[first], matrix.starts[last]):
-        for a in range(2):
-            solution[i, a] += length * u[i, a]
-            residual[i, a] -= length * forces[i, a]
+    """Step along `u`: add it to the solution, and take its forces off the residual.
 
-
-@compiled
-def scaled(first: int, last: int, matrix: Chunks, scale: float, residual: Field, right: Field, squares: Field) -> None:
-    """Set `right` to the residual times a scale, and `squares` to each chunk's squared norm of the residual."""
+    `right` is set to the residual times a scale, `squares` to each chunk's squared norm of the residual.
+    """
     for chunk in range(first, last):
         total = 0.0
         for i in range(matrix.starts[chunk], matrix.starts[chunk + 1]):
             for a in range(2):
+                solution[i, a] += length * u[i, a]
+                residual[i, a] -= length * forces[i, a]
                 right[i, a] = scale * residual[i, a]
                 total += residual[i, a] * residual[i, a]
         squares[chunk] = total

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.sparse import csr_array
+from scipy.sparse import bsr_array, csr_array
 
 from . import kernels
 from .factors import Factor, SingularError
@@ -93,49 +93,35 @@ class Multigrid:
         besides: csr_array | None = None,
     ) -> None:
         self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
-        self._held, self._places = held, np.flatnonzero(~held)
+        self._held, self._places, self._product = held, np.flatnonzero(~held), chunked(matrix)
         self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
-        self._levels: list[Level] = []
-        self._coarsest: Any = None
         if like is None or like._coarsest is None:
             self._lay_grids()
         else:
             self._borrowed, self._levels, self._coarsest = True, like._levels, like._coarsest
 
     def _lay_grids(self) -> None:
-        """Levels and the factor of the coarsest one, of the matrix itself."""
-        self._borrowed, self._levels, self._coarsest = False, [], None
-        try:
-            self._coarsest = self._coarsened()
-        except LinAlgError:  # then the matrix is not positive definite either
-            self._levels = []
-
-    def _coarsened(self) -> tuple[np.ndarray, Any]:
-        """Lay levels down to the coarsest one, whose unknowns and dense factor are returned."""
-        matrix, size = self._matrix, len(self._places)
+        """Levels, and unknowns and dense factor of the coarsest one; neither if the matrix is not positive definite."""
+        self._borrowed, self._levels = False, list[Level]()
+        self._coarsest: Any = None
+        matrix, grid, places = self._matrix, first_grid(self._points, COARSENING), self._places
         # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
         # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
-        if not (matrix.diagonal[:, ::2].ravel()[self._places] > 0).all():
-            raise LinAlgError("a diagonal that is not positive")
-        grid = first_grid(self._points, COARSENING)
-        while size > COARSEST and len(self._levels) < MOST_LEVELS:
-            coarse = galerkin(matrix, grid)
-            self._levels.append(_level(matrix, grid))
-            matrix, grid = coarse, next_grid(grid.shape)
-            size = int(np.count_nonzero(matrix.diagonal[:, ::2]))
-        places = np.flatnonzero(matrix.diagonal[:, ::2])
-        return places, cho_factor(dense(matrix)[np.ix_(places, places)])
-
-    def _give_up(self, error: NotPositiveError) -> Factor:
-        """The factor that takes over."""
-        if self._otherwise is None:
-            raise error
-        self._levels = []
-        self._direct = self._otherwise()
-        self.name = self._direct.name
-        return self._direct
+        if not (matrix.diagonal[:, ::2].ravel()[places] > 0).all():
+            return
+        try:
+            while len(places) > COARSEST and len(self._levels) < MOST_LEVELS:
+                coarse, chunks = galerkin(matrix, grid), smoother(matrix)
+                nodes = np.zeros((len(chunks.starts) - 1, grid.shape[0] * grid.shape[1], 2), np.float32)
+                fields = np.zeros((2, *grid.cells.shape), np.float32)
+                self._levels.append(Level(chunks, grid, (*fields, nodes)))
+                matrix, grid = coarse, next_grid(grid.shape)
+                places = np.flatnonzero(matrix.diagonal[:, ::2])
+            self._coarsest = places, cho_factor(dense(matrix)[np.ix_(places, places)])
+        except LinAlgError:
+            self._levels = []
 
     def cycle(self, depth: int, right: np.ndarray) -> tuple[np.ndarray, float]:
         """Return a cycle's answer to a right-hand side, in an array that the next one overwrites, and their product."""
@@ -158,18 +144,16 @@ class Multigrid:
     def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:
         """Solve for a right-hand side (unknowns,), to a residual relative to it."""
         if self._direct is None:
+            field = np.zeros(self._points.shape)
+            field.ravel()[self._places] = right
             try:
-                field = np.zeros(self._points.shape)
-                field.ravel()[self._places] = right
                 return self._gradients(field, tolerance).ravel()[self._places]
-            except NotPositiveError as error:
-                self._give_up(error)
-        assert self._direct is not None
+            except NotPositiveError:
+                if self._otherwise is None:
+                    raise
+                self._levels, self._direct = [], self._otherwise()
+                self.name = self._direct.name
         return self._direct.solve(right)
-
-    @cached_property
-    def _product(self) -> Chunks:
-        return chunked(self._matrix)
 
     def _multiply(
         self, better: np.ndarray, scale: float, keep: float, direction: np.ndarray, forces: np.ndarray
@@ -208,26 +192,22 @@ class Multigrid:
             right.ravel()[self._places] = random / np.linalg.norm(random)
             self._multiply(self.cycle(0, right)[0], size, 0.0, solution, forces)
             missing -= forces
-        run(kernels.scaled, self._product, scale, missing, right, squares)
-        direction, keep = np.zeros(missing.shape), 0.0
-        better, weight = self.cycle(0, right)
-        for count in range(MAX_CG_ITERATIONS):
+        direction, length, weight = np.zeros(missing.shape), 0.0, np.inf
+        for count in range(MAX_CG_ITERATIONS + 1):
+            run(kernels.advance, self._product, length, direction, forces, solution, missing, scale, right, squares)
+            if squares.sum() ** 0.5 <= tolerance * size:
+                self._certain |= proves
+                return solution
             if self._borrowed and count == MOST_BORROWED:
                 self._lay_grids()
                 return solution + self._gradients(missing, tolerance * size / float(np.linalg.norm(missing)))
             # The weight is in units of the scaled residual, as the preconditioner is linear.
-            stiffness = self._multiply(better, size, keep, direction, forces)
+            before = weight
+            better, weight = self.cycle(0, right)
+            stiffness = self._multiply(better, size, weight / before, direction, forces)
             if not stiffness > 0 or not weight > 0:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
             length = weight * size * size / stiffness
-            run(kernels.advance, self._product, length, direction, forces, solution, missing)
-            run(kernels.scaled, self._product, scale, missing, right, squares)
-            if squares.sum() ** 0.5 <= tolerance * size:
-                self._certain |= proves
-                return solution
-            before = weight
-            better, weight = self.cycle(0, right)
-            keep = weight / before
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
 
     def _check_particles(self) -> None:
@@ -275,13 +255,11 @@ def run(kernel: Callable[..., None], matrix: Chunks, *arguments: Any) -> None:
 
 def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
     """Matrix of the nodes of a grid, for displacements that are bilinear in its cells."""
-    nodes, height, count = grid.shape[0] * grid.shape[1], grid.shape[1], 0
-    while True:
+    nodes, height, count, found = grid.shape[0] * grid.shape[1], grid.shape[1], -1, 0
+    while found > count:  # points far from each other are joined
+        count = found
         near, far, far_blocks = np.zeros((nodes, 13, 4)), np.empty((count, 2), np.int64), np.empty((count, 4))
         found = kernels.coarsen(matrix, grid, near, far, far_blocks)
-        if found == count:
-            break
-        count = found  # points far from each other are joined
     diagonal = near[:, 0, [0, 1, 3]]
     right = np.repeat([0, 1, 2], [2, 5, 5]) * height + np.concatenate([[1, 2], range(-2, 3), range(-2, 3)])
     rows, slots = np.nonzero(near[:, 1:].any(axis=2))
@@ -295,23 +273,12 @@ def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
     return Blocks(row_pointers(rows, nodes), columns.astype(np.int32), blocks, diagonal)
 
 
-def _level(matrix: Blocks, grid: Grid) -> Level:
-    """Level of a matrix; raises LinAlgError if it is not positive definite."""
-    chunks = smoother(matrix)
-    nodes = np.zeros((len(chunks.starts) - 1, grid.shape[0] * grid.shape[1], 2), np.float32)
-    return Level(chunks, grid, (np.zeros(grid.cells.shape, np.float32), np.zeros(grid.cells.shape, np.float32), nodes))
-
-
 def dense(matrix: Blocks) -> np.ndarray:
     """Return the matrix as a full one."""
-    count = len(matrix.diagonal)
-    rows = np.repeat(np.arange(count), np.diff(matrix.pointers))
-    full = np.zeros((count, 2, count, 2))
-    full[rows, :, matrix.columns, :] = matrix.blocks.reshape(-1, 2, 2)
-    full = full + full.transpose(2, 3, 0, 1)
-    every = np.arange(count)
-    full[every, :, every, :] = matrix.diagonal[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
-    return full.reshape(2 * count, 2 * count)
+    every, shape = np.arange(len(matrix.diagonal) + 1), (2 * len(matrix.diagonal),) * 2
+    parts = (matrix.blocks, matrix.columns, matrix.pointers), (matrix.diagonal[:, [0, 1, 1, 2]], every[:-1], every)
+    right, diagonal = (bsr_array((part.reshape(-1, 2, 2), *at), shape=shape).toarray() for part, *at in parts)
+    return right + right.T + diagonal
 
 
 def chunked(matrix: Blocks, dtype: Any = float) -> Chunks:

@@ -319,13 +319,7 @@ STEPS_PER_ESTIMATE = 40
 """Steps between new estimates of the lowest frequency."""
 
 
-def relax(
-    network: Network,
-    load: np.ndarray,
-    *,
-    linear: bool = False,
-    max_steps: int = 200_000,
-) -> Run:
+def relax(network: Network, load: np.ndarray, *, linear: bool = False, max_steps: int = 200_000) -> Run:
     r"""Find an equilibrium under a force over reference stiffness [m] by dynamic relaxation, with fictitious masses.
 
     Masses of twice the row sums of stiffness make a step of 1 stable. Damping is critical for the frequency

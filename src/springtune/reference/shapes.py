@@ -219,11 +219,7 @@ class Problem:
     """Data that all levels share: coarse triangles, stiffnesses, supports and loads by group, corners."""
 
     def __init__(
-        self,
-        shape: Shape,
-        load: LoadCase,
-        materials: Mapping[str, AnyMaterial],
-        grouped: GroupedMesh | None,
+        self, shape: Shape, load: LoadCase, materials: Mapping[str, AnyMaterial], grouped: GroupedMesh | None
     ) -> None:
         self.shape, self.load = shape, load
         self.points = {name: np.array(point, dtype=float) for name, point in shape.points.items()}

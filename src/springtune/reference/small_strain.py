@@ -291,12 +291,7 @@ class _Grid:
         return refined, energy, measured, max(round_off, float(unit * work / measured))
 
     def _forces(
-        self,
-        solution: np.ndarray,
-        direct: np.floating,
-        nu: float,
-        shear: np.floating,
-        other: np.ndarray | None = None,
+        self, solution: np.ndarray, direct: np.floating, nu: float, shear: np.floating, other: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.floating]:
         """Return inner forces in extended precision, and the unsigned work of stresses on strains.
 

@@ -24,11 +24,7 @@ from .base import DefinitionError, Springs
 
 
 def derive_by_parts(
-    definition: Any,
-    grouped: GroupedMesh,
-    materials: Mapping[str, AnyMaterial],
-    thickness: float,
-    given: object = None,
+    definition: Any, grouped: GroupedMesh, materials: Mapping[str, AnyMaterial], thickness: float, given: object = None
 ) -> Springs:
     """Return the springs of a body with parts of several materials, by a definition or the user's own function."""
     mesh, labels = grouped.mesh, part_names(grouped)
