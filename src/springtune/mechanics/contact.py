@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -122,10 +122,7 @@ class Body:
         load = network.reduce(share * self.forces)
         if self.pressure is not None:
             load = load + share * self.force * network.reduce(self.pressure.forces(moved))
-        resistance = (
-            network.linear_free_forces_over_k(moved) if self.moves_little else network.free_forces_over_k(moved)
-        )
-        return load - self.reference * resistance
+        return load - self.reference * network.free_forces_over_k(moved, self.moves_little)
 
     def tangent(self, share: float, more: sparray | None = None) -> csc_array:
         """Return the symmetric tangent of resistance less load [N/m], plus `more`, at a share of the load."""
@@ -196,8 +193,7 @@ class _Sides:
         self.wraps = (self.turn < -STRAIGHT_SINE)[order]
 
 
-@dataclass(frozen=True)
-class Contacts:
+class Contacts(NamedTuple):
     """Corners near edges: `shares` [1] are their places along the edge, `gaps` [m] are negative behind it."""
 
     owners: np.ndarray
@@ -251,7 +247,7 @@ class Contact:
             for target in range(len(self.all)):
                 if target != owner and min(owner, target) < len(self.bodies):
                     parts.append(self._contacts_between(owner, sides[owner], target, sides[target]))
-        return Contacts(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Contacts)))
+        return Contacts(*map(np.concatenate, zip(*parts)))
 
     def _floor_contacts(self, owner: int, sides: _Sides) -> Contacts:
         """Corners of a body near the floor."""
@@ -488,12 +484,8 @@ class Contact:
             first, second = (corner @ turn.T)[:, :, None], (side @ turn)[:, :, None]
             sides = (first @ along.transpose(0, 2, 1) + along @ first.transpose(0, 2, 1)) / length**2
             mixed = -turn / length + along @ second.transpose(0, 2, 1) / length**2
-            curvature = np.concatenate(
-                [np.concatenate([sides, mixed], axis=2), np.concatenate([mixed.transpose(0, 2, 1), 0 * sides], axis=2)],
-                axis=1,
-            )
-            unit = np.eye(2)
-            change = np.block([[-unit, unit], [-unit, 0 * unit]])
+            curvature = np.block([[sides, mixed], [mixed.transpose(0, 2, 1), 0 * sides]])
+            change = np.kron([[-1, 1], [-1, 0]], np.eye(2))
             matrices = -forces[met][:, None, None] * (change.T @ curvature @ change)
             parts[number] = body.network.stiffness_of(edges, matrices)
         return parts

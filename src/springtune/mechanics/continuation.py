@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..linalg.factors import Factor, SingularError
 from .network import Network
-from .newton import TOLERANCE, LoadedNetwork
+from .newton import TOLERANCE, LoadedNetwork, norm
 
 INCREMENT_BEYOND = 0.25
 """First increment beyond the last load step, over that step."""
@@ -75,11 +75,9 @@ def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, sca
     u, at = last.u + du, last.load + ds
     for step in range(1, MOST_POINT_STEPS + 1):
         displacements = problem.moved(at, network.expand(u))
-        load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
-            missing = at * load - network.free_forces_over_k(displacements)
-            size = np.linalg.norm(missing)
-        if not np.isfinite(size):
+            missing = at * problem.load_at(displacements) - network.free_forces_over_k(displacements)
+        if not np.isfinite(size := norm(missing)):
             return None
         factor = problem.factorize_tangent(at, displacements)
         if size <= TOLERANCE * scale:
@@ -144,9 +142,8 @@ def continue_path(
         if np.isnan(limit) and abs(found.load) < abs(point.load) and unstable:
             limit, lost = _limit_load(way, loads), np.nan if lost == point.load else lost
             if not farthest:  # the top is between two points: a load next to it may be carried
-                return Continuation(
-                    limit, lost, stable if abs(limit) >= (1 - LIMIT_LOAD_TOLERANCE) * abs(target) else None
-                )
+                carried = abs(limit) >= (1 - LIMIT_LOAD_TOLERANCE) * abs(target)
+                return Continuation(limit, lost, stable if carried else None)
             most, increment = MOST_POINTS_BEHIND, max(increment, farthest)
         elif np.isnan(lost) and unstable:
             lost = found.load
@@ -200,9 +197,8 @@ def follow(
         if limit is not None and np.linalg.norm(point.u) >= limit or point.load / s >= 1.0:
             message = ""
             break
-        length = min(
-            length * (1.5 if point.steps <= FEW_STEPS else 0.5 if point.steps > MANY_STEPS else 1.0), increment
-        )
+        growth = 1.5 if point.steps <= FEW_STEPS else 0.5 if point.steps > MANY_STEPS else 1.0
+        length = min(growth * length, increment)
     return Path(
         np.array([point.load for point in points]),
         np.array([problem.moved(point.load, network.expand(point.u)) for point in points]),

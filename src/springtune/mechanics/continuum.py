@@ -28,7 +28,7 @@ Stress at particles is a linear field fitted to the surrounding cells (superconv
 and J. Z. Zhu, Int. J. Numer. Methods Eng. 33:1331, 1992); outline particles take their inner neighbours' mean.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -86,10 +86,8 @@ def strip_fault(mesh: Mesh) -> str:
     size = max(np.ptp(x), np.ptp(y))
     sides = [(side, y[side]) for side in (left, right)]
     rising = all(len(side) > 1 and (np.diff(heights) > 0).all() for side, heights in sides)
-    whole = rising and all(
-        abs(heights[[0, -1]] - [y.min(), y.max()]).max() <= STRIP_TOLERANCE * size for _, heights in sides
-    )
-    if not whole:
+    faces = [y.min(), y.max()]
+    if not rising or any(abs(heights[[0, -1]] - faces).max() > STRIP_TOLERANCE * size for _, heights in sides):
         return f"its ends do not run from a straight lower face to a straight upper one; {remedy}"
     heights = np.union1d(y[left], y[right])
     lengths = np.interp(heights, y[right], x[right]) - np.interp(heights, y[left], x[left])
@@ -116,14 +114,18 @@ def free_body(mesh: Mesh) -> np.ndarray:
 def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
     """Return the mean displacement gradient over the area [1], by the divergence theorem; row by column."""
     total = np.zeros((2, 2))
-    for corners in mesh.cells.values():
-        # Side by side around each cell.
-        here, moved = mesh.points[corners], displacements[corners]
-        side = np.roll(here, -1, axis=1) - here
-        normal = np.stack([side[..., 1], -side[..., 0]], axis=2)
-        middle = 0.5 * (np.roll(moved, -1, axis=1) + moved)
-        total += np.einsum("nia,nib->ab", middle, normal)
+    for corners, normals in _cell_normals(mesh):
+        moved = displacements[corners]
+        total += np.einsum("nia,nib->ab", 0.5 * (np.roll(moved, -1, axis=1) + moved), normals)
     return total / mesh.area
+
+
+def _cell_normals(mesh: Mesh) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Corners of cells (n, m), and outward normals of their sides times lengths (n, m, 2), by number of corners."""
+    for corners in mesh.cells.values():
+        here = mesh.points[corners]
+        x, y = (np.roll(here, -1, axis=1) - here).transpose(2, 0, 1)
+        yield corners, np.stack([y, -x], axis=2)
 
 
 class PatchTest:
@@ -144,7 +146,7 @@ class PatchTest:
         """Displacements [m] whose free directions are in equilibrium with the given held ones."""
         if not network.unknowns:
             return given
-        return given - network.expand(network.rest_factor.solve(network.linear_free_forces_over_k(given)))
+        return given - network.expand(network.rest_factor.solve(network.free_forces_over_k(given, linear=True)))
 
     @cached_property
     def strip_fault(self) -> str:
@@ -172,12 +174,9 @@ class PatchTest:
 
         Times the thickness over the reference stiffness [1]. Exact on any mesh, the stiffest test (Hill's bounds).
         """
-        held = self._frame[0]
-        network = self._network("frame", held, springs)
-        fields = unit_fields(self.mesh)
-        return work_of(
-            fields, [network.linear_forces_over_k(self._relaxed(network, field)) for field in fields], self.mesh
-        )
+        network, fields = self._network("frame", self._frame[0], springs), unit_fields(self.mesh)
+        forces = [network.linear_forces_over_k(self._relaxed(network, field)) for field in fields]
+        return work_of(fields, forces, self.mesh)
 
     def axial(self, springs: Elastic) -> tuple[float, float]:
         """Return E t over the reference stiffness and nu [1]: along x for a strip, else means over all directions."""
@@ -218,11 +217,8 @@ def lateral_forces(mesh: Mesh) -> np.ndarray:
 def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
     """Return the forces over the thickness [N/m], (n_points, 2), of an even stress (2, 2) [Pa] on all outlines."""
     total = np.zeros(mesh.points.shape)
-    for corners in mesh.cells.values():
-        # Cell by cell; inside they cancel.
-        here = mesh.points[corners]
-        side = np.roll(here, -1, axis=1) - here
-        pull = 0.5 * np.stack([side[..., 1], -side[..., 0]], axis=2) @ stress.T
+    for corners, normals in _cell_normals(mesh):  # inside they cancel
+        pull = 0.5 * normals @ stress.T
         np.add.at(total, corners, pull + np.roll(pull, 1, axis=1))
     return total
 
@@ -266,15 +262,15 @@ def particle_stresses(
 ) -> np.ndarray:
     """Return the stress at the particles (n_points, 3) from `chosen` cells, of one part; NaN without one."""
     # Corner by corner of the cells: the side to the next corner, and stress and middle of the cell.
-    sides_of, values, middles, number = [], [], [], 0
+    around_cells, number = [], 0
     for count, cells in mesh.cells.items():
         kept = slice(None) if chosen is None else chosen[count]
         corners = cells[kept]
-        sides_of.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
-        values.append(np.repeat(stresses[count][kept], count, axis=0))
-        middles.append(np.repeat(mesh.points[corners].mean(axis=1), count, axis=0))
+        sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+        of_cells = stresses[count][kept], mesh.points[corners].mean(axis=1)
+        around_cells.append((sides, *(np.repeat(one, count, axis=0) for one in of_cells)))
         number += len(corners)
-    pairs, value, middle = np.concatenate(sides_of), np.concatenate(values), np.concatenate(middles)
+    pairs, value, middle = map(np.concatenate, zip(*around_cells))
     count, size, particle = len(mesh.points), np.sqrt(mesh.area / number), pairs[:, 0]
     fits, good = _fits(mesh.points, particle, middle, value, count, size)
     # Of the sides of these cells, those that have one of them are the outline.

@@ -174,11 +174,9 @@ class AngleEnergy(Energy):
     modulus: np.ndarray
 
     @cached_property
-    def _factors(self) -> tuple[np.ndarray, np.ndarray]:
-        """A factor for each triangle, and one for each of its corners (3, n_cells): their product is the modulus."""
-        if self.modulus.ndim == 1:
-            return self.modulus, np.ones((3, 1))
-        return np.ones(len(self.modulus)), np.ascontiguousarray(self.modulus.T)
+    def _stiffness(self) -> np.ndarray:
+        """Modulus of each corner, shape (3, n_cells)."""
+        return np.ascontiguousarray(np.broadcast_to(self.modulus.T, (3, len(self.modulus))))
 
     def _change(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Change of each angle [rad], and the vectors from each corner to the next and to the one before."""
@@ -186,15 +184,11 @@ class AngleEnergy(Energy):
         sine, cosine = cross(a, b), dot(a, b)
         more_sine = cross(da, b) + cross(a, db) + cross(da, db)
         more_cosine = dot(da, b) + dot(a, db) + dot(da, db)
-        change = np.arctan2(
-            more_sine * cosine - more_cosine * sine, (sine + more_sine) * sine + (cosine + more_cosine) * cosine
-        )
-        return change, a + da, b + db
+        along = (sine + more_sine) * sine + (cosine + more_cosine) * cosine
+        return np.arctan2(more_sine * cosine - more_cosine * sine, along), a + da, b + db
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
-        change, _, _ = self._change(moved)
-        of_cell, of_corner = self._factors
-        return 0.5 * of_cell * (of_corner * change**2).sum(axis=0)
+        return 0.5 * (self._stiffness * self._change(moved)[0] ** 2).sum(axis=0)
 
     @staticmethod
     def _slopes(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -205,21 +199,20 @@ class AngleEnergy(Energy):
 
     def _forces(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
-        to_next, to_last = (self.modulus.T * change * slope for slope in self._slopes(a, b))
+        to_next, to_last = (self._stiffness * change * slope for slope in self._slopes(a, b))
         return preceding(to_next) + following(to_last) - to_next - to_last
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
         to_next, to_last = self._slopes(a, b)
         own = -to_next - to_last
-        pull = self.modulus.T * change
-        of_cell, of_corner = self._factors
+        stiffness, pull = self._stiffness, self._stiffness * change
         blocks = np.empty((3, 2, 2, len(self.modulus)))
         # Side (j, k): corners j and k have their own angles there, and that of the corner opposite, i, sees both.
         for i, (j, k) in enumerate(self._pairs):
-            at_ends = of_corner[j] * _products(own[:, j], to_next[:, j])
-            at_ends += of_corner[k] * _products(to_last[:, k], own[:, k])
-            blocks[i] = of_cell * (at_ends + of_corner[i] * _products(to_next[:, i], to_last[:, i]))
+            blocks[i] = stiffness[j] * _products(own[:, j], to_next[:, j])
+            blocks[i] += stiffness[k] * _products(to_last[:, k], own[:, k])
+            blocks[i] += stiffness[i] * _products(to_next[:, i], to_last[:, i])
             x, y = a[:, j]
             bend = (pull[j] - pull[k]) / (x * x + y * y) ** 2
             off, diagonal = bend * (y * y - x * x), bend * (2 * x * y)
@@ -274,8 +267,7 @@ class BiquadraticEnergy(Energy):
         return following(along) - preceding(along)
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
-        at_rest = not moved.any()  # where nothing pulls
-        sides, _, pull = (self._sides(self._rest), None, None) if at_rest else self._stresses(moved)
+        sides, _, pull = self._stresses(moved)
         tensile, coupling = self._halves
         blocks = np.empty((3, 2, 2, sides.shape[2]))
         for i, (j, k) in enumerate(self._pairs):
@@ -287,8 +279,7 @@ class BiquadraticEnergy(Energy):
                 block += _products(coupling[j] * at_k, at_i)
                 block += _products(coupling[k] * at_i, at_j)
             np.multiply(4, block, out=blocks[i])
-            if pull is not None:
-                blocks[i, [0, 1], [0, 1]] -= 2 * pull[i]
+            blocks[i, [0, 1], [0, 1]] -= 2 * pull[i]
         return blocks
 
 
@@ -308,25 +299,19 @@ class _SheetEnergy(Energy):
 
     def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
         """Derivatives of D and of J by each corner's position [1/m], and the law; NaN for inverted triangles."""
-        moved = moved - moved[:, :1]
         area, (along, across) = self._rest_area, self._rest_slopes
-        first, second = self._distortions(moved)
+        first, second, growth = self._distortions(moved)
         by_x, by_y = first * along + second * across, second * along - first * across
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            law = self._law(*self._invariants(moved))
-        return 2 * np.stack([by_x, by_y]) / area, area_slopes(self._rest + moved) / area, law
+            law = self._law(first**2 + second**2, growth)
+        return 2 * np.stack([by_x, by_y]) / area, area_slopes(self._rest + (moved - moved[:, :1])) / area, law
 
-    def _distortions(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The two terms whose squares make D, F11 - F22 and F12 + F21."""
-        (x, y), (along, across) = moved - moved[:, :1], self._rest_slopes
-        area = self._rest_area
-        return (x * along - y * across).sum(axis=0) / area, (x * across + y * along).sum(axis=0) / area
-
-    def _invariants(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """D and J - 1, NaN where a triangle is flat or inside out."""
-        first, second = self._distortions(moved)
-        growth = self._growth(moved) / self._rest_area
-        return first**2 + second**2, np.where(growth > -1.0, growth, np.nan)
+    def _distortions(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """F11 - F22 and F12 + F21, whose squares make D, and J - 1, NaN where a triangle is flat or inside out."""
+        (x, y), (along, across), area = moved - moved[:, :1], self._rest_slopes, self._rest_area
+        growth = self._growth(moved) / area
+        first, second = (x * along - y * across).sum(axis=0) / area, (x * across + y * along).sum(axis=0) / area
+        return first, second, np.where(growth > -1.0, growth, np.nan)
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
         energy = self._state(moved)[2][0]
@@ -376,16 +361,15 @@ class YeohEnergy(_SheetEnergy):
         if not np.isfinite(self.largest).any():
             return ""
         with np.errstate(invalid="ignore"):
-            distortion, growth = self._invariants(self._at_corners(displacements))
-            excess = distortion + _dilation(growth)[0]
+            first, second, growth = self._distortions(self._at_corners(displacements))
+            excess = first**2 + second**2 + _dilation(growth)[0]
         over = excess > self.largest
-        beyond = int(over.sum())
-        if not beyond:
+        if not over.any():
             return ""
         worst = int(np.argmax(np.where(over, excess, 0.0)))
         end = np.broadcast_to(self.largest, excess.shape)[worst]
         at = f"to I1 - 3 = {excess[worst]:.3g} where the data end at {end:.3g}"
-        return f"extrapolated: {beyond} of {len(excess)} triangles are stretched beyond the test data, {at}"
+        return f"extrapolated: {over.sum()} of {len(excess)} triangles are stretched beyond the test data, {at}"
 
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
         dilation, first_j, second_j = _dilation(growth)

@@ -44,10 +44,9 @@ PINS_FROM_UNKNOWNS = 5_000
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
     """Return the solver that takes over if conjugate gradients with multigrid do not converge."""
-    first, most = (
-        ("Cholesky", MOST_CHOLESKY_UNKNOWNS) if symmetric and cholesky else ("SuperLU", NO_CHOLESKY_FROM_UNKNOWNS)
-    )
-    return first if solver is None and unknowns <= most else None
+    direct = symmetric and cholesky
+    most = MOST_CHOLESKY_UNKNOWNS if direct else NO_CHOLESKY_FROM_UNKNOWNS
+    return ("Cholesky" if direct else "SuperLU") if solver is None and unknowns <= most else None
 
 
 NO_STIFFNESS = 1e-12
@@ -116,17 +115,13 @@ class Network:
         self.energies = tuple(energies)
         self.has_springs = bool(np.any(stiffness)) or not self.energies
         self._indefinite = False  # the last matrix that was factorized, a large one
-        if like is not None:
-            self._pattern = like._pattern if like.mesh is mesh else like._pattern.moved(mesh)
-        self.first, self.second = mesh.edges.T
+        pattern = Pattern(mesh, held) if like is None else like._pattern
+        self._pattern = pattern if pattern.mesh is mesh else pattern.moved(mesh)
+        self.first, self.second = pattern.first, pattern.second
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths
 
     # -- unknowns ---------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def _pattern(self) -> Pattern:
-        return Pattern(self.mesh, self.held)
 
     @property
     def unknowns(self) -> int:
@@ -151,9 +146,9 @@ class Network:
 
     # -- mechanics --------------------------------------------------------------------------------------------------
 
-    def free_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
-        """Return the force against displacements over k [m], shape (unknowns,)."""
-        return self.reduce(self.forces_over_k(displacements))
+    def free_forces_over_k(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
+        """Return the force against displacements over k [m], shape (unknowns,); `linear`: in linear kinematics."""
+        return self.reduce((self.linear_forces_over_k if linear else self.forces_over_k)(displacements))
 
     def forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force against displacements at all particles over k [m], shape (n_points, 2)."""
@@ -202,10 +197,6 @@ class Network:
         total += self._pattern.sum_springs(sizes, -sizes)
         return np.finfo(float).eps * self.reduce(total)
 
-    def linear_free_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
-        """Return the force against displacements in linear kinematics over k [m], shape (unknowns,)."""
-        return self.reduce(self.linear_forces_over_k(displacements))
-
     def linear_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Forces of a linear network against displacements, with held directions [m], shape (n_points, 2)."""
         normals = self.rest_vectors / self.rest_lengths[:, None]
@@ -213,10 +204,8 @@ class Network:
         pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
         resistance = -self._pattern.sum_springs(pull[:, None] * normals)
         if self.energies:
-            apart = apart.T
-            at_first = np.einsum("abn,bn->na", self._rest_couplings, apart)
-            at_second = np.einsum("ban,bn->na", self._rest_couplings, apart)
-            resistance += self._pattern.sum_springs(at_first, at_second)
+            ends = (np.einsum(f"{places},nb->na", self._rest_couplings, apart) for places in ("abn", "ban"))
+            resistance += self._pattern.sum_springs(*ends)
         return resistance
 
     @cached_property
@@ -247,9 +236,8 @@ class Network:
         """Blocks of the tangent that couple the ends of each spring, shape (2, 2, n_springs)."""
         couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros((2, 2, len(self.first)))
         if self.energies:
-            at_rest = displacements is None
-            of_cells = self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)
-            couplings = couplings + of_cells
+            at_rest, energies = displacements is None, self.energies
+            couplings += self._rest_couplings if at_rest else self._pattern.cell_couplings(energies, displacements)
         return couplings
 
     def _spring_couplings(self, displacements: np.ndarray | None) -> np.ndarray:
@@ -292,8 +280,7 @@ class Network:
         except SingularError as error:
             raise SingularError(self._mechanism(slack) or str(error)) from error
         if slack.any() and getattr(factor, "least_pivot", np.inf) < SMALL_PIVOT * np.abs(self.stiffness).max():
-            mechanism = self._mechanism(slack)
-            if mechanism:
+            if mechanism := self._mechanism(slack):
                 raise SingularError(mechanism)
         return factor
 
@@ -342,11 +329,7 @@ class Network:
 
     def factorize_matrix(self, matrix: csc_array, symmetric: bool = True) -> Factor:
         """Factorize a matrix with the tangent's sparsity, such as a sum of `stiffness_of`, by a direct solver."""
-        if symmetric and self._by_cholesky:
-            factor = self._cholesky(matrix)
-            if factor is not None:
-                return factor
-        return self._superlu(matrix)
+        return (symmetric and self._by_cholesky and self._cholesky(matrix)) or self._superlu(matrix)
 
     def _superlu(self, matrix: csc_array) -> SuperLUFactor:
         order, places, indices, pointers = self._pattern.elimination
@@ -398,20 +381,16 @@ class Network:
 
         def otherwise() -> Factor:
             matrix = self.tangent(displacements, follower)
-            factor = self._cholesky(matrix) if next_one == "Cholesky" else self._superlu(matrix)
-            if factor is None:
-                raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
-            return factor
+            if factor := self._cholesky(matrix) if next_one == "Cholesky" else self._superlu(matrix):
+                return factor
+            raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
 
-        besides = None
-        if follower is not None:
-            s, load = follower
-            besides = self._pattern.loose_entries(load.edges, -s * load.derivative)
+        # A pressure's part: the load of s times its derivative.
+        besides = follower and self._pattern.loose_entries(follower[1].edges, -follower[0] * follower[1].derivative)
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
-        return Multigrid(
-            self.blocks(displacements), self.mesh.points, self.held, otherwise if next_one else None, like, besides
-        )
+        takes_over = otherwise if next_one else None
+        return Multigrid(self.blocks(displacements), self.mesh.points, self.held, takes_over, like, besides)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

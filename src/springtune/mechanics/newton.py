@@ -99,7 +99,7 @@ class LoadedNetwork:
         self._dead = None if dead is None or follower is None else network.reduce(dead)
         if given is not None:
             # A first scale, to refine the linear solution, whose own forces are the final one.
-            self.load_norm += float(np.linalg.norm(network.linear_free_forces_over_k(given)))
+            self.load_norm += float(np.linalg.norm(network.free_forces_over_k(given, linear=True)))
             forces = np.where(network.held, network.linear_forces_over_k(self.slope), 0.0)
             self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
 
@@ -108,14 +108,12 @@ class LoadedNetwork:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
 
         def balance(slope: np.ndarray) -> tuple[np.ndarray, float]:
-            missing = self.load - self.network.linear_free_forces_over_k(slope)
+            missing = self.load - self.network.free_forces_over_k(slope, linear=True)
             return missing, norm(missing) / self.load_norm
 
         network, factor = self.network, self.network.rest_factor
-        if self.given is None:
-            first = network.expand(factor.solve(self.load))
-        else:
-            first = self.given + network.expand(factor.solve(self.load - network.linear_free_forces_over_k(self.given)))
+        start = np.zeros(network.held.shape) if self.given is None else self.given
+        first = start + network.expand(factor.solve(balance(start)[0]))
         here, error = refine(network, Iterate(first, *balance(first)), factor, balance, linear=True)
         return here.displacements, here.residual, error
 
@@ -213,9 +211,7 @@ class Newton:
         """Return the equilibrium from displacements [m] that contain the prescribed ones; from rest if invalid."""
         here = self._iterate_at(start)
         if not np.isfinite(here.residual) or self.network.inverted(start):
-            rest = np.zeros_like(start)
-            begin = self.problem.moved(self.s, rest)
-            here = Iterate(rest, self.s * self.problem.load, 1.0) if begin is rest else self._iterate_at(begin)
+            here = self._iterate_at(self.problem.moved(self.s, np.zeros_like(start)))
         self._here = self._best = here
         self._factor: Factor | None = None
         self._factorizations = self._steps = self._since_best = 0

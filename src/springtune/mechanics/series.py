@@ -1,6 +1,6 @@
 """Sensitivity curves: the displacement under many loads ``s = F / k`` from one equilibrium path, by power series."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,8 +50,7 @@ def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> t
     return path.values, path.stable
 
 
-@dataclass(frozen=True)
-class _Point:
+class _Point(NamedTuple):
     """A predicted point, corrected; the tangent is that of the prediction."""
 
     displacements: np.ndarray
@@ -132,10 +131,8 @@ class StablePath:
                 factor = self.problem.network.factorize_tangent(point.displacements)
             except SingularError:
                 break
-            displacements = before = point.displacements
-            series = Expansion(
-                self.problem.network, self.problem.load, loads[count - 1], displacements, factor, HIGH_ORDER
-            )
+            before, problem = point.displacements, self.problem
+            series = Expansion(problem.network, problem.load, loads[count - 1], before, factor, HIGH_ORDER)
             values[count:], errors = series.measure(self.weights, loads[count:])
             served = errors <= CURVE_TOLERANCE
         return values, good, count
@@ -199,13 +196,9 @@ class StablePath:
     def _stretch_between(self, displacements: np.ndarray, before: np.ndarray | float) -> float:
         """Largest change of a spring's length from one place to another, over that at rest [1]."""
         network = self.problem.network
-        lengths = [
-            np.linalg.norm(
-                network.rest_vectors + network.end_differences(np.broadcast_to(field, network.held.shape)), axis=1
-            )
-            for field in (before, displacements)
-        ]
-        return float((np.abs(lengths[1] - lengths[0]) / network.rest_lengths).max())
+        fields = np.broadcast_to(before, network.held.shape), displacements
+        first, second = (np.linalg.norm(network.rest_vectors + network.end_differences(one), axis=1) for one in fields)
+        return float((np.abs(second - first) / network.rest_lengths).max())
 
     def _stable_at(self, load: float) -> bool:
         """Whether the point that a series of the load predicts is stable."""
@@ -304,11 +297,8 @@ class StablePath:
         if network.inverted(guess):
             return None, None
         found = self.problem.newton(s, guess, FEW_FACTORIZATIONS)
-        if (
-            not found.converged
-            or found.factor is None
-            or network.largest_change(found.displacements - guess) > PATH_DISTANCE
-        ):
+        near = found.converged and network.largest_change(found.displacements - guess) <= PATH_DISTANCE
+        if not near or found.factor is None:
             return None, None
         try:
             return found.displacements, found.factor if found.factor.negative_pivots == 0 else None

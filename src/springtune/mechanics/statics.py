@@ -112,9 +112,8 @@ class Expansion:
 
     def _extend(self, order: int) -> None:
         network = self._network
-        d, length, inverse, coefficients, loads = (
-            _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients, self.loads)
-        )
+        series = self._d, self._length, self._inverse, self.coefficients, self.loads
+        d, length, inverse, coefficients, loads = (_grown(array, order + 1) for array in series)
         weight = network.stiffness * network.rest_lengths
         for n in range(self.order + 1, order + 1):
             right = self._load
@@ -337,16 +336,12 @@ class StaticProblem(LoadedNetwork):
             found = self.newton(s, start(s))
             iterations += found.iterations
             if found.converged:
-                change = self.network.largest_change(found.displacements)  # never below the stretch
-                near = (
-                    change <= FAR_STRETCH
-                    or change <= FAR_CHANGE
-                    and self.network.largest_stretch(found.displacements) <= FAR_STRETCH
-                )
-                rest = np.zeros(found.displacements.shape)
+                network, moved = self.network, found.displacements
+                change = network.largest_change(moved)  # never below the stretch
+                near = change <= FAR_STRETCH or change <= FAR_CHANGE and network.largest_stretch(moved) <= FAR_STRETCH
                 if near and (
                     change <= UNSNAPPED_CHANGE
-                    or self._has_no_snap(0.0, rest, s, found.displacements, s * self.slope)
+                    or self._has_no_snap(0.0, 0 * moved, s, moved, s * self.slope)
                     or self._is_unstable(s, found)
                 ):
                     return replace(found, iterations=iterations)
@@ -405,9 +400,8 @@ class StaticProblem(LoadedNetwork):
             looked_at = found.converged and np.isnan(unstable)
             leaves = looked_at and self._is_unstable(there, found)
             bend = 0.25 * step / (step + last_step)
-            apart = (
-                looked_at and not leaves and not self._has_no_snap(here, last, there, found.displacements, guess, bend)
-            )
+            way = here, last, there, found.displacements, guess, bend
+            apart = looked_at and not leaves and not self._has_no_snap(*way)
             limit, inverts, failed = np.nan, False, apart or not found.converged
             if failed and step <= SMALLEST_STEP and last_step:
                 limit, lost, end, inverts = continue_path(self, here, last, before, there)
@@ -416,10 +410,8 @@ class StaticProblem(LoadedNetwork):
                 if end is not None and np.isnan(lost):
                     guess = self.network.expand(end.u)
                     near = self.newton(there, guess)
-                    close = (
-                        near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISING_CHANGE
-                    )
-                    if close and not self._is_unstable(there, near):
+                    change = self.network.largest_change(near.displacements - guess)
+                    if near.converged and change <= SURPRISING_CHANGE and not self._is_unstable(there, near):
                         found, failed, missed = near, False, False
             if not failed and (step <= SHORTEST_STEP or not missed):
                 if leaves or missed and np.isnan(unstable):

@@ -91,9 +91,8 @@ class Moving:
 
     def missing(self, displacements: np.ndarray) -> np.ndarray:
         """Load less resistance [m], shape (unknowns,)."""
-        resist = self.network.linear_free_forces_over_k if self.linear else self.network.free_forces_over_k
         with np.errstate(over="ignore", invalid="ignore"):
-            return self.network.reduce(self.load) - resist(displacements)
+            return self.network.reduce(self.load) - self.network.free_forces_over_k(displacements, self.linear)
 
 
 def make_stepper(
@@ -144,9 +143,8 @@ class _ExplicitSteps(Stepper):
             keep, gain = 1 - 2 * half, step * self.inverse
         else:
             keep, gain = (1 - half) / (1 + half), step * self.inverse / (1 + half)
-        self._as: Callable[..., np.ndarray]
-        self._back: Callable[..., np.ndarray]
-        self._as = self._back = np.array
+        identity: Callable[..., np.ndarray] = np.array
+        self._as = self._back = identity
         self._numbers = self.kind(keep), self.kind(step)
         self.function: Callable[..., None] | None = None
         if motion.linear:
@@ -193,10 +191,8 @@ class _ExplicitSteps(Stepper):
         _, place = self._order()
         order = np.argsort(network.reduce(2 * place[:, None] + np.arange(2)))
         place = np.argsort(order)
-        matrix, dampers = (
-            part if part is None else csc_array(part[order][:, order]) for part in (matrix, motion.damper_matrix)
-        )
-        damping = np.zeros(0) if dampers is None else dampers.data
+        matrix, dampers = csc_array(matrix[order][:, order]), motion.damper_matrix
+        damping = np.zeros(0) if dampers is None else csc_array(dampers[order][:, order]).data
         index = matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32)
         numbers = matrix.data, damping, network.reduce(gain)[order], network.reduce(motion.load)[order]
         arrays = *index, *(np.ascontiguousarray(values, dtype=self.kind) for values in numbers)
@@ -213,11 +209,8 @@ class _ExplicitSteps(Stepper):
         """Particles in the order in which they are advanced, and the place of each in it."""
         mesh = self.motion.network.mesh
         # Where all of them are next to the processor anyway, none are advanced before others.
-        order = (
-            narrow(len(mesh.points), mesh.edges)
-            if len(mesh.edges) > LEAST_ENTRIES_A_THREAD
-            else np.arange(len(mesh.points))
-        )
+        count = len(mesh.points)
+        order = narrow(count, mesh.edges) if len(mesh.edges) > LEAST_ENTRIES_A_THREAD else np.arange(count)
         return order, np.argsort(order)
 
     def begin(self, u: np.ndarray, v: np.ndarray) -> None:

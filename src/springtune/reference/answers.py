@@ -107,10 +107,8 @@ def beyond_linear(rotation: float, strain: float) -> str:
     """Return why a small-strain reference of this rotation [rad] and strain [1] does not fit nonlinear kinematics."""
     reasons = []
     # The first term of the series bounds the effect: most beams do without the elastica, and without importing it.
-    if (
-        4 / 35 * (2 * rotation) ** 2 > MOST_ROTATION_EFFECT
-        and -(effect := rotation_effect(rotation)) > MOST_ROTATION_EFFECT
-    ):
+    may_matter = 4 / 35 * (2 * rotation) ** 2 > MOST_ROTATION_EFFECT
+    if may_matter and -(effect := rotation_effect(rotation)) > MOST_ROTATION_EFFECT:
         reasons.append(f"it turns by {abs(rotation):.2g} rad, and a cantilever that turns so far deflects by "
                        f"{-100 * effect:.2g} % less than in small strain")  # fmt: skip
     if abs(strain) > MOST_STRAIN:

@@ -72,8 +72,7 @@ class Family:
         shares = np.column_stack([1 - local.sum(axis=1), local]).clip(0)
         values, _ = shape_functions(space.degree, (shares / shares.sum(axis=1, keepdims=True))[:, 1:])
         ends = values.shape[1] * np.arange(len(points) + 1)
-        reading = csr_array(
-            (values.ravel(), space.numbers[found].ravel(), ends), shape=(len(points), len(space.places))
-        )
+        entries = values.ravel(), space.numbers[found].ravel(), ends
+        reading = csr_array(entries, shape=(len(points), len(space.places)))
         apart = np.linalg.norm(reading @ space.places - points, axis=1) / np.ptp(space.mesh.points)
         return kron(reading, eye_array(2), format="csr"), apart

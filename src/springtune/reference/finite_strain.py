@@ -15,9 +15,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.interpolate import krogh_interpolate
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
@@ -271,9 +272,8 @@ class _Sheet(Body):
         side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
         places = self.nodes_at = basis.doflocs.T
         # Coordinates of the nodes: ends and middles of elements. Those of one line differ by rounding.
-        self.axes = [
-            np.interp(np.arange(2 * len(ends) - 1) / 2, np.arange(len(ends)), ends) for ends in (along, across)
-        ]
+        ends = along, across
+        self.axes = [np.interp(np.arange(2 * len(one) - 1) / 2, np.arange(len(one)), one) for one in ends]
         self.held, self.given = np.zeros(places.shape, dtype=bool), np.zeros(places.shape)
         for where, axes in kind.half_held if kind.symmetric else kind.held:
             there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
@@ -303,10 +303,8 @@ class _Sheet(Body):
         """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
         x, y = self.axes
         field = np.empty((len(x), len(y), 2))
-        columns, rows = (
-            np.searchsorted((axis[1:] + axis[:-1]) / 2, at) for axis, at in zip((x, y), self.nodes_at.T, strict=True)
-        )
-        field[columns, rows] = moved
+        at = self.nodes_at.T
+        field[*(np.searchsorted((axis[1:] + axis[:-1]) / 2, one) for axis, one in zip((x, y), at))] = moved
         if not self.kind.symmetric:
             return x, y, field
         if self.kind.cut == BOTTOM:  # the upper half
@@ -327,14 +325,12 @@ def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
 
 
 def strain_of(gradient: np.ndarray) -> np.ndarray:
-    """Green's strains xx, yy and 2 xy."""
-    x, y = gradient[..., 0], gradient[..., 1]  # derivatives by x and by y
-    parts = [x[..., 0] + (x * x).sum(-1) / 2, y[..., 1] + (y * y).sum(-1) / 2, x[..., 1] + y[..., 0] + (x * y).sum(-1)]
-    return np.stack(parts, axis=-1)
+    """Green's strains xx, yy and 2 xy: a quadratic form is half of its derivative along its argument."""
+    return _strain_change(0.5 * gradient, gradient)
 
 
 def _strain_change(gradient: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Derivative of `strain_of` along a change of the gradient."""
+    """Derivative of Green's strains along a change of the gradient of displacements."""
     x, y, by_x, by_y = gradient[..., 0], gradient[..., 1], change[..., 0], change[..., 1]
     parts = [
         by_x[..., 0] + (x * by_x).sum(-1),
@@ -436,20 +432,15 @@ class Yeoh(PlaneLaw):
     """Yeoh's law of an incompressible sheet in plane stress, with E = 1."""
 
     def __init__(self, coefficients: Sequence[float]) -> None:
-        self.coefficients = coefficients
+        self._energy = Polynomial([0.0, *coefficients])
 
     def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
         """Energy of t and d."""
-        excess = trace + 1 / d - 3
-        return np.asarray(sum(c * excess**n for n, c in enumerate(self.coefficients, 1)))
+        return self._energy(trace + 1 / d - 3)
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """Derivatives of W = sum_n c_n x^n with x = t + 1/d - 3."""
-        excess = trace + 1 / d - 3
-        first = sum(n * c * excess ** (n - 1) for n, c in enumerate(self.coefficients, 1)) + np.zeros_like(excess)
-        second = np.zeros_like(excess)
-        for n, c in enumerate(self.coefficients[1:], 2):
-            second = second + n * (n - 1) * c * excess ** (n - 2)
+        first, second = (self._energy.deriv(n)(trace + 1 / d - 3) for n in (1, 2))
         by_d = -1 / d**2
         return (first, first * by_d), (second, second * by_d, second * by_d**2 + 2 * first / d**3)
 
@@ -537,8 +528,7 @@ def law_of(material: Material, plane: str = "stress") -> PlaneLaw:
     return Yeoh([1 / (4 * (1 + nu))])
 
 
-@dataclass(frozen=True)
-class Response:
+class Response(NamedTuple):
     """Second Piola-Kirchhoff `stress` xx, yy, xy over E, (..., 3), and `tangent` (..., 3, 3) by Green's strains."""
 
     stress: np.ndarray

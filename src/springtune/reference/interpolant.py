@@ -7,7 +7,7 @@ interpolated; coefficients and error fall geometrically (Trefethen, Approximatio
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -41,15 +41,11 @@ BOX_TOLERANCE = 1e-9
 """How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
 
 
-ANSWER_NAMES = ("displacement", "mean_displacement", "rotation", "strain")
-
-
 class NotCertifiedError(RuntimeError):
     """No interpolant over a box meets its tolerance; solve the unit problems one by one."""
 
 
-@dataclass(frozen=True)
-class Answers:
+class Answers(NamedTuple):
     """Answers of unit problems: over half the height and over the traction over Young's modulus."""
 
     displacement: np.ndarray
@@ -57,6 +53,9 @@ class Answers:
     rotation: np.ndarray
     strain: np.ndarray
     error_estimate: float
+
+
+ANSWER_NAMES = Answers._fields[:-1]
 
 
 @dataclass(frozen=True)
@@ -191,9 +190,8 @@ class _Box:
         solved, of_checks = self._solve(checks)
         places = np.array(checks).T
         along, across = map(lagrange_values, places, values.shape[1:])
-        differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _interpolated_values(solved)).max(
-            axis=1
-        )
+        found = np.einsum("pa,qan,pn->qp", along, values, across)
+        differences = np.abs(found - _interpolated_values(solved)).max(axis=1)
         if not differences[2:].max() <= LIMITS_TOLERANCE:
             raise self._failure(f"rotation and strain differ by {differences[2:].max():.1e} from those of solves")
         # Differences of logarithms are relative ones.

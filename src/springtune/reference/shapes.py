@@ -93,16 +93,10 @@ class ShapeReference:
 
     def scaled(self, factor: float) -> "ShapeReference":
         """The solution under so many times the load, prescribed displacements included: small strain is linear."""
-        by = {name: factor**2 if self._kinds[name] == "energy" else factor for name in self.values}
-        values = {name: value * by[name] for name, value in self.values.items()}
-        return replace(
-            self,
-            values=values,
-            energy=self.energy * factor**2,
-            rotation=self.rotation * abs(factor),
-            strain=self.strain * abs(factor),
-            _factor=self._factor * factor,
-        )
+        powers = {name: 2 if self._kinds[name] == "energy" else 1 for name in self.values}
+        values = {name: value * factor ** powers[name] for name, value in self.values.items()}
+        by = {"energy": factor**2, "rotation": abs(factor), "strain": abs(factor), "_factor": factor}
+        return replace(self, values=values, **{name: getattr(self, name) * one for name, one in by.items()})
 
 
 def solve_shape(
@@ -285,9 +279,10 @@ class Problem:
             flat = np.abs(way) < 1e-12
             return bool(flat[1] and x is None and y is not None or flat[0] and y is None and x is not None)
 
-        self.corners = corners_of(
-            self.mesh, condition, lambda side: not supported.keys().isdisjoint(side.groups), mirror
-        )
+        def held(side: Side) -> bool:
+            return not supported.keys().isdisjoint(side.groups)
+
+        self.corners = corners_of(self.mesh, condition, held, mirror)
         at_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
         rough = {point for point, corner in self.corners.items() if corner.rough}
         for name in used:
@@ -506,18 +501,13 @@ class Level:
         solution, load = np.where(held, prescribed, 0.0).ravel(), forces.ravel()
         inner = numbers[:, outer:]
         coupled, stiff = matrices[:, outer:, :outer], matrices[:, outer:, outer:]
-        if inner.shape[1]:
-            right = np.concatenate([coupled, load[inner][:, :, None]], axis=2)
-            eliminated = np.linalg.solve(stiff, right)
-            reduced = matrices[:, :outer, :outer] - coupled.transpose(0, 2, 1) @ eliminated[:, :, :outer]
-            passed = coupled.transpose(0, 2, 1) @ eliminated[:, :, outer:]
-        else:
-            reduced, passed = matrices, np.zeros((n, outer, 1))
+        eliminated = np.linalg.solve(stiff, np.concatenate([coupled, load[inner][:, :, None]], axis=2))
+        taken = coupled.transpose(0, 2, 1) @ eliminated
+        reduced, passed = matrices[:, :outer, :outer] - taken[:, :, :outer], taken[:, :, outer:]
         rows = numbers[:, :outer]
         right_side = load[: 2 * space.n_outer] - np.bincount(rows.ravel(), passed.ravel(), 2 * space.n_outer)
-        known = solution[rows]
-        if known.any():
-            right_side -= np.bincount(rows.ravel(), (reduced @ known[:, :, None]).ravel(), 2 * space.n_outer)
+        known = (reduced @ solution[rows][:, :, None]).ravel()
+        right_side -= np.bincount(rows.ravel(), known, 2 * space.n_outer)
         free_outer = free[: 2 * space.n_outer]
         order = np.cumsum(free_outer) - 1
         keep = (free_outer[rows][:, :, None] & free_outer[rows][:, None, :]).ravel()
@@ -533,8 +523,7 @@ class Level:
             found = factor.solve(right_side[free_outer])
             found += factor.solve(right_side[free_outer] - matrix @ found)
             solution[: 2 * space.n_outer][free_outer] = found
-        if inner.shape[1]:
-            solution[inner] = eliminated[:, :, outer] - (eliminated[:, :, :outer] @ solution[rows][:, :, None])[:, :, 0]
+        solution[inner] = eliminated[:, :, outer] - (eliminated[:, :, :outer] @ solution[rows][:, :, None])[:, :, 0]
         local = solution[numbers]
         internal = (matrices @ local[:, :, None])[:, :, 0]
         residual = np.bincount(numbers.ravel(), internal.ravel(), 2 * space.n_functions) - load

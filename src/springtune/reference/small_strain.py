@@ -233,10 +233,9 @@ class _Grid:
 
     def _along_force(self, part: np.ndarray) -> np.ndarray:
         """Values of all unknowns; those across the force are zero."""
-        first = np.zeros(self._split, EXTENDED_DTYPE)
-        second = np.zeros(len(self._unknowns[1][0]) * len(self._unknowns[1][1]), EXTENDED_DTYPE)
-        (first, second)[self._kind.axis][:] = part
-        return np.concatenate([first, second])
+        parts = [np.zeros(len(along) * len(across), EXTENDED_DTYPE) for along, across in self._unknowns]
+        parts[self._kind.axis][:] = part
+        return np.concatenate(parts)
 
     def _matrices(self) -> tuple[csc_array, csc_array, csc_array]:
         """Parts of the stiffness matrix: direct strains, lateral contraction, shear."""
@@ -307,12 +306,8 @@ class _Grid:
         u, v = (np.abs(part) for part in (self.fields(other) if other is not None else (u, v)))
         x, x_slope, y, y_slope = (abs(part) for part in (x, x_slope, y, y_slope))
         terms = x_slope @ u @ y.T, x @ v @ y_slope.T, x @ u @ y_slope.T + x_slope @ v @ y.T
-        ratio = abs(nu)
-        sizes = (
-            direct * (np.abs(xx) + ratio * np.abs(yy)),
-            direct * (np.abs(yy) + ratio * np.abs(xx)),
-            shear * np.abs(xy),
-        )
+        xx, yy, xy = (np.abs(strain) for strain in (xx, yy, xy))
+        sizes = direct * (xx + abs(nu) * yy), direct * (yy + abs(nu) * xx), shear * xy
         work = sum((weights * size * term).sum() for size, term in zip(sizes, terms))
         return np.concatenate([part[np.ix_(*ends)].ravel() for part, ends in zip(forces, self._unknowns)]), work
 
@@ -382,10 +377,8 @@ class _Line:
         ]
         self.weights = np.multiply.outer(half, 2 / (2 * np.arange(size, dtype=EXTENDED_DTYPE) + 1)).ravel()
         weighted = [self.weights[:, None] * of.toarray() for of in (value, slope)]
-        self.mass, self.slope, self.mixed = (
-            np.asarray(of.T @ by, float)
-            for of, by in ((value, weighted[0]), (slope, weighted[1]), (slope, weighted[0]))
-        )
+        pairs = (value, weighted[0]), (slope, weighted[1]), (slope, weighted[0])
+        self.mass, self.slope, self.mixed = (np.asarray(of.T @ by, float) for of, by in pairs)
         self.integrals = value.T @ (self.weights * (np.arange(count * size) % size == 0))
 
     def values(self, points: np.ndarray) -> np.ndarray:

@@ -187,9 +187,8 @@ class CoarseMesh:
                         wheres.append(self._cut_side(corner, end, SHRINKAGE, cuts[end]))
                 near, far = cuts[a], cuts[b]
                 triangles += [(v, near, far)]
-                if np.linalg.norm(wheres[near - len(self.points)] - self.points[b]) < np.linalg.norm(
-                    wheres[far - len(self.points)] - self.points[a]
-                ):
+                here, there = (wheres[cut - len(self.points)] for cut in (near, far))
+                if np.linalg.norm(here - self.points[b]) < np.linalg.norm(there - self.points[a]):
                     triangles += [(near, a, b), (near, b, far)]
                 else:
                     triangles += [(near, a, far), (a, b, far)]
@@ -509,14 +508,11 @@ def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.nda
         kernel, slope = _side_kernels(degree, corners[:, j] - corners[:, i])
         product = corners[:, i] * corners[:, j]
         values.append(product[:, None] * kernel)
-        gradients.append(
-            kernel[..., None] * product_gradient(i, j)[:, None]
-            + (product[:, None] * slope)[..., None] * (CORNER_GRADIENTS[j] - CORNER_GRADIENTS[i])
-        )
+        turned = (product[:, None] * slope)[..., None] * (CORNER_GRADIENTS[j] - CORNER_GRADIENTS[i])
+        gradients.append(kernel[..., None] * product_gradient(i, j)[:, None] + turned)
     bubble = corners.prod(axis=1)
-    bubble_gradient = (
-        corners[:, 2, None] * product_gradient(0, 1) + (corners[:, 0] * corners[:, 1])[:, None] * (CORNER_GRADIENTS[2])
-    )
+    bubble_gradient = corners[:, 2, None] * product_gradient(0, 1)
+    bubble_gradient += (corners[:, 0] * corners[:, 1])[:, None] * CORNER_GRADIENTS[2]
     first, second = corners[:, 1] - corners[:, 0], 2 * corners[:, 2] - 1
     for total in range(degree - 2):
         for i in range(total + 1):
