@@ -95,6 +95,8 @@ class Multigrid:
         self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
         self._held, self._places, self._product = held, np.flatnonzero(~held), chunked(matrix)
         self.name = "multigrid"
+        self._levels: list[Level]
+        self._coarsest: Any
         self._direct: Factor | None = None
         self._certain = False
         if like is None or like._coarsest is None:
@@ -104,8 +106,7 @@ class Multigrid:
 
     def _lay_grids(self) -> None:
         """Levels, and unknowns and dense factor of the coarsest one; neither if the matrix is not positive definite."""
-        self._borrowed, self._levels = False, list[Level]()
-        self._coarsest: Any = None
+        self._borrowed, self._levels, self._coarsest = False, [], None
         matrix, grid, places = self._matrix, first_grid(self._points, COARSENING), self._places
         # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
         # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.

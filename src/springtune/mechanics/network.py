@@ -116,7 +116,7 @@ class Network:
         self.has_springs = bool(np.any(stiffness)) or not self.energies
         self._indefinite = False  # the last matrix that was factorized, a large one
         pattern = Pattern(mesh, held) if like is None else like._pattern
-        self._pattern = pattern if pattern.mesh is mesh else pattern.moved(mesh)
+        self._pattern: Pattern = pattern if pattern.mesh is mesh else pattern.moved(mesh)
         self.first, self.second = pattern.first, pattern.second
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths
