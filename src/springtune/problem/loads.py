@@ -42,11 +42,6 @@ class Side:
     far: bool
 
     @property
-    def opposite(self) -> "Side":
-        """The side across the rectangle."""
-        return Side(self.axis, not self.far)
-
-    @property
     def name(self) -> str:
         """Its name as a group."""
         return (("left", "right"), ("bottom", "top"))[self.axis][self.far]
@@ -102,14 +97,13 @@ class LoadKind:
     @property
     def clamped(self) -> bool:
         """Whether the side opposite to the loaded one is clamped and nothing else is held."""
-        return self.held == ((self.loaded.opposite, BOTH),)
+        return self.held == ((Side(self.normal, not self.loaded.far), BOTH),)
 
     @property
     def mirrored(self) -> bool:
         """Whether the supports are symmetric about the middle of the loaded side."""
         held = {(side, *directions) for side, directions in self.held}
-        across = ((side.opposite if side.axis == self.along else side, *axes) for side, axes in self.held)
-        return held == set(across)
+        return held == {(Side(side.axis, side.far != (side.axis == self.along)), *axes) for side, axes in self.held}
 
     @property
     def symmetric(self) -> bool:
