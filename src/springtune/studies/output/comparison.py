@@ -29,6 +29,10 @@ HIDDEN_ATTRIBUTES = {"created", "history", "config", "config_sha256", "software"
 
 Labels = dict[str, str | float]
 
+Pair = Sequence[xr.Dataset]
+Arrays = Sequence[xr.DataArray]
+"""Before and after."""
+
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -181,12 +185,7 @@ def _noted_attributes(attributes: Mapping[Hashable, object]) -> dict[str, str]:
 
 
 def _compare_group(
-    path: str,
-    given: Sequence[xr.Dataset],
-    roots: Sequence[xr.Dataset],
-    left_out: Collection[str],
-    tolerance: Tolerance,
-    most: int | None,
+    path: str, given: Pair, roots: Pair, left_out: Collection[str], tolerance: Tolerance, most: int | None
 ) -> GroupChanges:
     """Compare labels, cells and all variables of a group but those that are left out."""
     numbers = [{name: range(size) for name, size in one.sizes.items() if name not in one.indexes} for one in given]
@@ -206,28 +205,28 @@ def _compare_group(
     if all("status" in data for data in pair) and not _why_unlike(*(data["status"] for data in pair)):
         found.cells = _cells_of_one(asked, dimensions, most)
     both: tuple[Any, ...] = xr.align(*pair, *asked, join="inner", copy=False)
-    one, other, *masks = both
     for name in (name for name in names[0] if name in names[1]):
-        if reason := _why_unlike(one[name], other[name]):
+        arrays = [data[name] for data in both[:2]]
+        if reason := _why_unlike(*arrays):
             found.unlike[name] = reason
             continue
-        changes = found.flags if is_flagged(one[name]) else found.values
-        changes.append(_compare_variable(path, one[name], other[name], masks, dimensions, tolerance, most))
+        changes = found.flags if is_flagged(arrays[0]) else found.values
+        changes.append(_compare_variable(path, arrays, both[2:], dimensions, tolerance, most))
     return found
 
 
 def _why_unlike(one: xr.DataArray, other: xr.DataArray) -> str:
     """Return why two variables cannot be compared, or an empty string."""
     if set(one.dims) != set(other.dims):
-        sides = (f"({', '.join(map(str, side.dims))})" for side in (one, other))
-        return "has other dimensions: {} before, {} after".format(*sides)
+        before, after = (", ".join(map(str, side.dims)) for side in (one, other))
+        return f"has other dimensions: ({before}) before, ({after}) after"
     if (one.dtype.kind in "OUS") != (other.dtype.kind in "OUS"):
         return "is a text in one dataset and a number in the other"
     units = [str(side.attrs["units"]) for side in (one, other) if "units" in side.attrs]
     return f"has other units: {units[0]} before, {units[1]} after" if len(set(units)) > 1 else ""
 
 
-def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int | None) -> tuple[CellsOfOne, ...]:
+def _cells_of_one(asked: Arrays, dimensions: set[str], most: int | None) -> tuple[CellsOfOne, ...]:
     """Cells that only one side requests, for each side."""
     masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
     alone = []
@@ -241,17 +240,11 @@ def _cells_of_one(asked: Sequence[xr.DataArray], dimensions: set[str], most: int
 
 
 def _compare_variable(
-    group: str,
-    one: xr.DataArray,
-    other: xr.DataArray,
-    asked: Sequence[xr.DataArray],
-    dimensions: set[str],
-    tolerance: Tolerance,
-    most: int | None,
+    group: str, pair: Arrays, asked: Arrays, dimensions: set[str], tolerance: Tolerance, most: int | None
 ) -> VariableChanges:
     """Compare a variable on common labels; a curve or field counts by its worst point."""
-    names = sorted(map(str, one.dims), key=lambda name: name not in dimensions)
-    one, other = one.transpose(*names), other.transpose(*names)
+    names = sorted(map(str, pair[0].dims), key=lambda name: name not in dimensions)
+    one, other = (side.transpose(*names) for side in pair)
     name = str(one.name)
     if not one.size:
         return VariableChanges(name, 0, 0, [])
@@ -260,11 +253,11 @@ def _compare_variable(
     texts = flagged or one.dtype.kind in "OUS"
     if flagged:
         a, b = (np.where(side == NOT_REQUESTED, "", side) for side in (a, b))
-    missing = [values == "" if texts else np.isnan(values) for values in (a, b)]
+    there = [values != "" if texts else ~np.isnan(values) for values in (a, b)]
     of_both = [mask.any([dim for dim in mask.dims if dim not in names]).broadcast_like(one) for mask in asked]
     masks = [mask.transpose(*names).values for mask in of_both]
-    unmatched = (missing[0] & ~missing[1] & masks[0]) | (missing[1] & ~missing[0] & masks[1])
-    both = ~missing[0] & ~missing[1]
+    unmatched = (there[0] != there[1]) & np.where(there[0], masks[1], masks[0])
+    both = there[0] & there[1]
     differ = both & (a != b)
     excess = np.where(unmatched, np.inf, 0.0)
     points = tuple(range(sum(name in dimensions for name in names), one.ndim))
@@ -286,7 +279,7 @@ def _compare_variable(
     return VariableChanges(name, int(compared), len(worst), rows)
 
 
-def _cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
+def _cell_dimensions(pair: Pair, roots: Pair) -> set[str]:
     """Dimensions of cells: those of messages, or else of a status, and those with text labels."""
     found: set[Hashable] = set()
     for data, root in zip(pair, roots):
@@ -333,5 +326,5 @@ def _excess_of_texts(a: str, b: str, relative: float) -> float:
     """Difference over tolerance of texts that differ only in numbers; infinite for others."""
     if without_numbers(a) != without_numbers(b) or not relative:
         return math.inf
-    pairs = [tuple(float(one[0]) for one in NUMBER.finditer(text)) for text in (a, b)]
-    return max((abs(y - x) / (relative * max(abs(x), abs(y))) for x, y in zip(*pairs) if x != y), default=0.0)
+    pairs = zip(*((float(one[0]) for one in NUMBER.finditer(text)) for text in (a, b)))
+    return max((abs(y - x) / (relative * max(abs(x), abs(y))) for x, y in pairs if x != y), default=0.0)

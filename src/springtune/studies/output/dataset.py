@@ -127,9 +127,8 @@ class Group:
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:
     """Label of a dimension with the most requested scenes."""
-    requested = root.status != 0
-    counts = requested.sum([name for name in requested.dims if name != dimension])
-    return str(counts[dimension].values[int(counts.values.argmax())])
+    counts = (root.status != 0).sum([name for name in root.status.dims if name != dimension])
+    return str(counts[dimension].values[counts.values.argmax()])
 
 
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
@@ -211,11 +210,8 @@ def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashabl
         if sparse:
             options = {"chunks": _chunk_shape(array.shape, TEXTS_IN_CHUNK)}
         elif not texts and values.nbytes > UNCOMPRESSED_BYTES:
-            options = {
-                "chunks": _chunk_shape(array.shape, CHUNK_BYTES // values.itemsize),
-                "compression": "gzip",
-                "shuffle": True,
-            }
+            chunks = _chunk_shape(array.shape, CHUNK_BYTES // values.itemsize)
+            options = {"chunks": chunks, "compression": "gzip", "shuffle": True}
         dtype = h5py.string_dtype() if texts else values.dtype
         stored = group.create_variable(name, array.dims, dtype, fillvalue=fill, **options)
         stored.attrs.update(array.attrs)
@@ -339,9 +335,8 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
     # What is shown rather than others comes last.
     ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
     there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
-    shape = there.shape[len(kept) :]
     flat = there.values.reshape(*there.shape[: len(kept)], -1)
-    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), shape)
+    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), there.shape[len(kept) :])
     coordinates = {name: there[name].values for name in kept}
     return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
 

@@ -99,9 +99,8 @@ def dataset_file(path: str | os.PathLike[str]) -> Path:
     path = Path(path)
     file = path / "dataset.nc" if path.is_dir() else path
     if not file.is_file():
-        raise FileNotFoundError(
-            f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
-        )
+        remedy = "run the study, or give its results/<study>/dataset.nc"
+        raise FileNotFoundError(f"{path}: there is no such dataset; {remedy}")
     return file
 
 
@@ -111,10 +110,8 @@ def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except (AttributeError, ArithmeticError, LookupError, MemoryError, RuntimeError, TypeError) as error:
-        raise ValueError(
-            f"{path}: is damaged, or not as springtune writes it ({reason(error)}); delete it, "
-            "and the same run makes it again"
-        ) from error
+        why = f"is damaged, or not as springtune writes it ({reason(error)})"
+        raise ValueError(f"{path}: {why}; delete it, and the same run makes it again") from error
 
 
 def reason(error: Exception) -> str:
