@@ -145,17 +145,15 @@ class LogHandler(LogHandlerBase):
             self.wanted = False  # what Snakemake says after it is shown
             self._stop()
             sys.stderr.write(f"{record.getMessage()}\n")
-        elif self.display is None and record.levelno < WARNING:
+        elif self.display is None:
             self.held.append(record)
-        elif self.display is None:  # an error before the run
-            self._stop()
-            self.plain.emit(record)
+            if record.levelno >= WARNING:  # an error before the run
+                self._stop()
         else:
-            display = self.display
             if event in NUMBERS:
-                display.record_event(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
+                self.display.record_event(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
             if record.levelno >= WARNING:
-                display.write_above(lambda: self.plain.emit(record))
+                self.display.write_above(lambda: self.plain.emit(record))
 
     def _stop(self) -> None:
         """Remove the display, and write held-back records."""

@@ -17,6 +17,11 @@ from .messages import Key, Problems, part_of, show
 from .model import Grid
 from .sections import SAME_VALUE, StatedStiffness, StudyConfig, factors
 
+Place = Sequence[Key]
+"""Path in a study."""
+
+Names = Iterable[str]
+
 PLAUSIBLE_FACTOR = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness is an error of units, as the paper's 170E6 N/mm."""
 
@@ -35,16 +40,14 @@ ANOTHER = "take another definition, or give each a grid of its own"
 # -- names -------------------------------------------------------------------------------------------------------------
 
 
-def check_known(
-    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str | None
-) -> None:
+def check_known(problems: Problems, path: Place, what: str, name: str, names: Names, section: str | None) -> None:
     """Check that a name is known; a `section` may declare it."""
     if name not in names:
         declared = f"; or declare it under {section}" if section else ""
         problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}{declared}")
 
 
-def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
+def check_beam_material(problems: Problems, path: Place, name: str, config: StudyConfig) -> None:
     """Check that a beam material is isotropic."""
     given = config.materials[name]
     if given.young_modulus is None and given.uniaxial_test is None:
@@ -52,14 +55,14 @@ def check_beam_material(problems: Problems, path: Sequence[Key], name: str, conf
         problems.add(path, f"{why}; put the sheet under 'shapes', whose references take any material")
 
 
-def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
+def check_density(config: StudyConfig, name: str, path: Place, problems: Problems) -> None:
     """Check that a declared material has a density."""
     if config.materials[name].density is None:
         problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
 
 
 def check_scene(
-    problems: Problems, path: Sequence[Key], scene: Any, config: StudyConfig, able: Callable[[str], bool], why: str
+    problems: Problems, path: Place, scene: Any, config: StudyConfig, able: Callable[[str], bool], why: str
 ) -> None:
     """Check that the material of a scene is isotropic with a density, and that its load is able."""
     check_beam_material(problems, (*path, "material"), scene.material, config)
@@ -114,7 +117,7 @@ def most_scenes() -> int:
 
 def check_count(
     problems: Problems,
-    path: Sequence[Key],
+    path: Place,
     lists: Mapping[str, Collection[Any]],
     most: int,
     what: str = "combinations",
@@ -128,7 +131,7 @@ def check_count(
     return count
 
 
-def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
+def check_product(problems: Problems, section: object, path: Place, labels: Iterable[str], most: int) -> None:
     """Check the product of a section's lists before it is expanded."""
     check_count(problems, path, {label: getattr(section, label) for label in labels}, most)
 
@@ -177,9 +180,7 @@ def in_mm(length: float) -> str:
     return f"{1e3 * length:g} mm"
 
 
-def check_particles(
-    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
-) -> None:
+def check_particles(problems: Problems, path: Place, sizes: Iterable[float], length: float, height: float) -> None:
     """Refuse mesh sizes that give too many particles in a box."""
     size = min(sizes)
     count = MESH_TYPES["structured"].particles(length, height, size)
@@ -202,12 +203,7 @@ def check_meshes(config: StudyConfig, grids: Iterable[Grid], problems: Problems)
 
 
 def check_able(
-    problems: Problems,
-    path: Sequence[Key],
-    names: Iterable[str],
-    mesh_types: Iterable[str] = (),
-    loads: Iterable[str] = (),
-    derived: bool = True,
+    problems: Problems, path: Place, names: Names, mesh_types: Names = (), loads: Names = (), derived: bool = True
 ) -> None:
     """Check that definitions fit mesh types and loads, and, if `derived`, need no reference and no stated stiffness."""
     for name in names:

@@ -28,10 +28,8 @@ def requested_cells(group: Variables, finite: Variables | None = None, error: st
     dims, values = group[error]
     there = broadcast(dims, *group["status"]) != Status.NOT_REQUESTED
     places = dict(zip(dims, np.nonzero(np.broadcast_to(there, values.shape))))
-    cells = {}
-    for name, (own, values) in group.items():
-        if own and {*own} <= {*dims}:
-            cells[name] = values[tuple(places[one] for one in own)]
+    held = ((name, *row) for name, row in group.items() if row[0] and {*row[0]} <= {*dims})
+    cells = {name: values[tuple(places[one] for one in own)] for name, own, values in held}
     valid = cells[error]
     if "reference_applies" in cells:
         valid = np.where(cells["reference_applies"] == 1, valid, np.nan)
@@ -128,9 +126,8 @@ def what_to_type(cells: Columns, by: Sequence[str] = ("mesh_type", "material")) 
         for name in sorted({*cells["definition"][here & known].tolist()}):
             own = here & (cells["definition"] == name)
             springs, edges = (np.unique(values[own & np.isfinite(values)]) for values in (inside, outline))
-            share = ratio[own & np.isfinite(ratio)]
+            share, errors = ratio[own & np.isfinite(ratio)], cells["valid_error"][own & known]
             median = float(np.median(share)) if share.size else np.nan
-            errors = cells["valid_error"][own & known]
             answers.append(Answer(labels, size, name, bool(uniform[own].any()), springs, edges, median, errors))
         kinds = ([one for one in answers if one.uniform == alike] for alike in (False, True))
         yield tuple(min(kind, key=lambda one: one.median_error) for kind in kinds if kind)

@@ -32,6 +32,9 @@ STATUS = tuple(map(str, Status))
 Label = str | float
 """Label along a dimension: a text or a number in SI units."""
 
+Axes = Mapping[str, Sequence[Label]]
+"""Labels by dimension."""
+
 DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "beam": "beam, length x height in mm",
     "mesh_type": "mesh type",
@@ -61,7 +64,7 @@ class Group:
     flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
     further: dict[str, dict[str, object]] = field(default_factory=dict)
 
-    def empty(self, axes: Mapping[str, Sequence[Label]], names: Collection[str] | None = None) -> xr.Dataset:
+    def empty(self, axes: Axes, names: Collection[str] | None = None) -> xr.Dataset:
         """Create the dataset with empty cells."""
         chosen = {name: row for name, row in self.variables.items() if names is None or name in names}
         data, used = {}, set()
@@ -83,16 +86,12 @@ class Group:
             words = described[dimension]
             long_name, units = words if isinstance(words, tuple) else (words, "1")
             values = np.array(axes[dimension])
-            if values.dtype.kind == "U":
-                values = values.astype(object)
+            values = values.astype(object) if values.dtype.kind == "U" else values
             coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
         return xr.Dataset(data, coordinates)
 
     def of_rows(
-        self,
-        axes: Mapping[str, Sequence[Label]],
-        rows: Iterable[Mapping[str, object]] | pd.DataFrame,
-        names: Collection[str] | None = None,
+        self, axes: Axes, rows: Iterable[Mapping[str, object]] | pd.DataFrame, names: Collection[str] | None = None
     ) -> xr.Dataset:
         """Create the dataset of rows of labels and values; each value goes to the labels that its variable has."""
         frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
@@ -254,9 +253,8 @@ def tree(file: h5netcdf.File) -> xr.DataTree:
             values = stored[...] if texts else np.asarray(stored)
             variables[name] = xr.Variable(stored.dimensions, values, _attributes(stored))
         groups[group.name] = xr.decode_cf(xr.Dataset(variables, attrs=_attributes(group)))
-        for one in groups[group.name].variables.values():
-            if one.nbytes <= LARGE_ARRAY_BYTES:
-                one.load()
+        for one in (one for one in groups[group.name].variables.values() if one.nbytes <= LARGE_ARRAY_BYTES):
+            one.load()
     return xr.DataTree.from_dict(groups)
 
 

@@ -121,15 +121,6 @@ def reason(error: Exception) -> str:
     return clipped(" ".join(text.split()), REASON_CHARACTERS)
 
 
-def without_fields(data: "xarray.DataTree") -> str:
-    """Return why a dataset has no networks of beams, and the remedy."""
-    said = "the dataset has no group '/fields'"
-    if data.variables:
-        return f"{said}; add 'deformed' or 'paraview' to the outputs of the study, and run it"
-    shown = " 'shape_fields' has those of shapes:" if "shape_fields" in data.children else ""
-    return f"{said}, nor has its study beams;{shown} take a group as it is, one of {', '.join(data.children)}"
-
-
 def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
     """Network of one beam and mesh type with its fields, as an unstructured mesh by UGRID-1.0.
 
@@ -172,7 +163,12 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
     if not hasattr(data, "children"):
         raise ValueError(f"data: {type(data).__name__} is no dataset; give what springtune.open returns")
     if "fields" not in data.children:
-        raise ValueError(without_fields(data))
+        why = "the dataset has no group '/fields'"
+        if data.variables:
+            raise ValueError(f"{why}; add 'deformed' or 'paraview' to the outputs of the study, and run it")
+        shown = " 'shape_fields' has those of shapes:" if "shape_fields" in data.children else ""
+        others = f"take a group as it is, one of {', '.join(data.children)}"
+        raise ValueError(f"{why}, nor has its study beams;{shown} {others}")
     from .dataset import network
 
     with guarded("the group '/fields'"):

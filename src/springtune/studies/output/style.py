@@ -19,6 +19,9 @@ from matplotlib.ticker import NullLocator
 
 from springtune.problem.quantities import Status
 
+Canvas = Figure | SubFigure | Axes | np.ndarray | None
+"""Where a plot is drawn: a new figure if None."""
+
 P = ParamSpec("P")
 Drawn = TypeVar("Drawn")
 
@@ -129,12 +132,7 @@ def _show_texts_verbatim(panel: Axes) -> None:
 
 
 def panels(
-    ax: Figure | SubFigure | Axes | np.ndarray | None,
-    nrows: int = 1,
-    ncols: int = 1,
-    *,
-    figsize: tuple[float, float],
-    **subplots: Any,
+    ax: Canvas, nrows: int = 1, ncols: int = 1, *, figsize: tuple[float, float], **subplots: Any
 ) -> tuple[Figure | SubFigure | None, np.ndarray]:
     """Return the figure to arrange, if any, and axes of shape (nrows, ncols)."""
     if ax is None:
@@ -305,7 +303,7 @@ def swatches(colours: Mapping[str, str]) -> list[Patch]:
 
 
 def small_multiples(
-    ax: Figure | SubFigure | Axes | np.ndarray | None,
+    ax: Canvas,
     shown: Mapping[str, Any],
     columns: int,
     height: float,
