@@ -8,7 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import MeshError
-from .sheets import OTHER_FILES_REASON, Block, Content, places
+from .sheets import Content, places
+
+OTHER_FILES_REASON = "parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
+"""Why a file is refused that names other files."""
 
 KEYWORDS_NOT_READ = {
     r"N(GEN|FILL|COPY|MAP)|EL(GEN|COPY)|SYSTEM|PARAMETER|IMPORT|SYMMETRICMODEL\w*|MODELCHANGE": (
@@ -152,7 +155,7 @@ class _Model:
         table = np.array(self.points).reshape(-1, 4)
         tags = table[:, 0].astype(np.int64)
         corners = places(tags, [rows[:, 1:] for _, rows in self.elements])
-        content = Content(table[:, 1:], [Block(kind, found) for (kind, _), found in zip(self.elements, corners)])
+        content = Content(table[:, 1:], [(kind, found) for (kind, _), found in zip(self.elements, corners)])
         for name in self.surfaces:
             if name.upper() not in self.shown:
                 content.unusable[name] = "is a `*SURFACE`, which is not read; give a set of its points"

@@ -13,19 +13,7 @@ from ..registry import NAME, NAME_RULE
 from ..safe_io.files import DataElsewhere, bounded, check_alone, check_folder, replacing, why_unreadable
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas, upright
-from .sheets import (
-    COORDINATE_TOLERANCE,
-    LINEAR_CELLS_REMEDY,
-    OTHER_FILES_REASON,
-    Block,
-    Content,
-    GroupedMesh,
-    box_fault,
-    on_sides,
-    outline_of,
-    part_names,
-    sheet_fault,
-)
+from .sheets import COORDINATE_TOLERANCE, Content, GroupedMesh, box_fault, on_sides, outline_of, part_names, sheet_fault
 from .sides import in_words
 
 CORNER_COUNTS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
@@ -44,7 +32,7 @@ GHOST_KEYS = ("vtkGhostType", "vtkGhostLevels")
 """Data in which what belongs to other files is not 0."""
 
 REASONS_BY_ENDING = {
-    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), OTHER_FILES_REASON),
+    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), abaqus.OTHER_FILES_REASON),
     **dict.fromkeys((".bdf", ".nas", ".fem"), "is of Nastran, which is not read; export it as .msh, .inp or .vtu"),
     **dict.fromkeys((".e", ".exo", ".ex2"), "is of Exodus, which is not read; export it as .msh, .inp or .vtu"),
 }
@@ -195,7 +183,7 @@ def _read_vtu(raw: bytes) -> Content:
     if re.search(rb"compressor\s*=\s*.vtkLZ4", head):
         raise MeshError("is compressed by LZ4, which is not read; write it with ZLib, or without compression")
     if re.search(rb"type\s*=\s*.P(Unstr|Poly)", head):
-        raise MeshError(OTHER_FILES_REASON)
+        raise MeshError(abaqus.OTHER_FILES_REASON)
     pieces = len(re.findall(rb"<Piece\b", head))
     if pieces > 1:
         raise MeshError(f"has {pieces} pieces, and one is read; join them, in ParaView by the filter Clean to Grid")
@@ -205,7 +193,7 @@ def _read_vtu(raw: bytes) -> Content:
         file.write_bytes(re.sub(rb"(<VTKFile[^>]*version\s*=\s*.)2\.\d", rb"\g<1>1.0", head) + mark + tail)
         found = library().read(file)
     if any(np.any(array) for key in GHOST_KEYS for array in found.cell_data.get(key, ())):
-        raise MeshError(OTHER_FILES_REASON)
+        raise MeshError(abaqus.OTHER_FILES_REASON)
     return _by_meshio(found)
 
 
@@ -215,8 +203,8 @@ def _by_meshio(found: Any) -> Content:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ValueError(f"coordinates of points of shape {points.shape}")
     if others := [block.type for block in found.cells if block.type not in CORNER_COUNTS]:
-        raise MeshError(f"has cells '{others[0]}'; {LINEAR_CELLS_REMEDY}")
-    content = Content(points, [Block(block.type, np.asarray(block.data)) for block in found.cells])
+        raise MeshError(f"has cells '{others[0]}'; {gmsh.LINEAR_CELLS_REMEDY}")
+    content = Content(points, [(block.type, np.asarray(block.data)) for block in found.cells])
     for kind, corners in content.cells:
         if len(corners) and (corners.shape[1:] != (CORNER_COUNTS[kind],) or corners.dtype.kind not in "iu"):
             raise ValueError(f"cells '{kind}' by numbers {corners.dtype} of shape {corners.shape}")

@@ -7,7 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from .cells import MeshError
-from .sheets import LINEAR_CELLS_REMEDY, Block, Content, places
+from .sheets import Content, places
+
+LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"
+"""Remedy for cells that are not read."""
 
 ELEMENT_TYPES = {15: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4)}
 """Name and number of points of elements that are read, by Gmsh's number."""
@@ -87,7 +90,7 @@ def read(raw: bytes) -> Content | None:
     if [len(tags), sum(len(corners) for _, corners, _ in found)] != [nodes.total, elements.total]:
         raise ValueError("it states other numbers of points or cells than it has")
     placed = places(tags, [corners for _, corners, _ in found])
-    content = Content(points, [Block(kind, own) for (kind, *_), own in zip(found, placed)])
+    content = Content(points, [(kind, own) for (kind, *_), own in zip(found, placed)])
     content.cell_groups |= {name: [] for name in names.values()}
     for (*_, own), (start, stop) in zip(found, pairwise(content.starts())):
         for name in own:

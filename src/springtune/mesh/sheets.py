@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -383,33 +382,22 @@ def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
     return found
 
 
-OTHER_FILES_REASON = "parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
-"""Why a file is refused that names other files."""
-
-LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"
-"""Remedy for cells that are not read."""
-
-
-class Block(NamedTuple):
-    """Cells of one type, by meshio's name, and their points."""
-
-    type: str
-    data: np.ndarray
-
-
 @dataclass
 class Content:
-    """Content of a mesh file: numbers of cells, over all blocks, and of points, by group; `unusable` are reasons."""
+    """Content of a mesh file: cells in blocks of one type, by meshio's name, with their points.
+
+    Groups are numbers of cells, over all blocks, and of points; `unusable` ones have a reason.
+    """
 
     points: np.ndarray
-    cells: list[Block]
+    cells: list[tuple[str, np.ndarray]]
     cell_groups: dict[str, list[np.ndarray]] = field(default_factory=lambda: defaultdict(list))
     point_groups: dict[str, list[np.ndarray]] = field(default_factory=lambda: defaultdict(list))
     unusable: dict[str, str] = field(default_factory=dict)
 
     def starts(self) -> list[int]:
         """Number of the first cell of each block, and of all cells."""
-        return [0, *np.cumsum([len(block.data) for block in self.cells]).tolist()]
+        return [0, *np.cumsum([len(corners) for _, corners in self.cells]).tolist()]
 
 
 def places(tags: np.ndarray, wanted: list[np.ndarray]) -> list[np.ndarray]:

@@ -249,7 +249,7 @@ def enclosed(sides: Sequence[OutlineSide]) -> float:
     return sum(side.swept_area(sides[0].start) for side in sides)
 
 
-def reversed_round(sides: Sequence[OutlineSide]) -> tuple[OutlineSide, ...]:
+def reverse_round(sides: Sequence[OutlineSide]) -> tuple[OutlineSide, ...]:
     """The same round the other way, from the same corner."""
     return tuple(OutlineSide(side.end, side.start, side.centre, side.group) for side in sides[::-1])
 

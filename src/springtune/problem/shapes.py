@@ -20,17 +20,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ..mesh.sides import (
-    OutlineSide,
-    Point,
-    Round,
-    enclosed,
-    extent,
-    find_meeting,
-    in_words,
-    reversed_round,
-    winds_about,
-)
+from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, find_meeting, in_words, reverse_round, winds_about
 from ..registry import NAME, NAME_RULE
 from .quantities import Number, nearest, positive, put, quantity
 
@@ -731,7 +721,7 @@ class Shape:
             if inside and not hole.part:
                 raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
         if enclosed(sides) < 0:
-            back = tuple(Segment(one.start, one.centre, one.group) for one in reversed_round(sides))
+            back = tuple(Segment(one.start, one.centre, one.group) for one in reverse_round(sides))
             put(self, outline=back)
         if names := sorted({*self.groups} & {*self.points}):
             raise ValueError(f"{names[0]!r} names a point and sides; rename one of them")
@@ -762,7 +752,7 @@ class Shape:
         holes = []
         for hole in self.holes:
             sides = _round(hole.outline, "hole")
-            holes.append(reversed_round(sides) if enclosed(sides) < 0 else sides)
+            holes.append(reverse_round(sides) if enclosed(sides) < 0 else sides)
         found = [Round(_round(self.outline, "outline"), "")]
         filled = sorted((enclosed(sides), number) for number, sides in enumerate(holes) if self.holes[number].part)
         for number, (hole, sides) in enumerate(zip(self.holes, holes)):
