@@ -77,7 +77,6 @@ def _check_texts(source: Path) -> None:
 
 
 def _labels(datasets: Mapping[str, Dataset]) -> list[str]:
-    """Labels of beams, definitions, mesh types and materials."""
     coordinates = [one.tree.coords for one in datasets.values()]
     names = ("beam", "definition", "mesh_type", "material")
     return sorted({str(label) for one in coordinates for name in names if name in one for label in one[name].values})
@@ -152,7 +151,6 @@ def draw(
 
 
 def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples: Path) -> bytes:
-    """Draw a figure and return its PDF."""
     import matplotlib
     import matplotlib.pyplot as plt
 
@@ -177,7 +175,6 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
 
 
 def _example_figure(script: Path, name: str) -> Any:
-    """Run an example and return its open figure."""
     import matplotlib.pyplot as plt
 
     if not script.is_file():
@@ -191,7 +188,6 @@ def _example_figure(script: Path, name: str) -> Any:
 
 
 def _plot_function(plot: str, name: str) -> Callable[..., object]:
-    """Return a public plot function by its name."""
     import springtune
 
     if not plot.startswith("plot_") or plot not in springtune.__all__:
@@ -201,7 +197,6 @@ def _plot_function(plot: str, name: str) -> Callable[..., object]:
 
 
 def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Describe the source of a figure: selection and hash of the dataset, or the script."""
     if drawing.example:
         return f"none, drawn by examples/{drawing.example}.py"
     place = ": ".join(filter(None, (drawing.study, cell_text(drawing.at, {"mesh_size": "m"}))))

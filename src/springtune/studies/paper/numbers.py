@@ -202,7 +202,6 @@ def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: M
 
 
 def _evaluate(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
-    """Evaluate a declared number."""
     if number.formula:
         value, why = _formula(number.formula, found, name), f"the formula '{number.formula}' has no value"
     else:
@@ -317,7 +316,6 @@ def _selected(data: xr.Dataset, variable: str, dimension: str, label: Any, optio
 
 
 def _reduce(number: Number, cells: pd.DataFrame, name: str) -> float:
-    """Reduce cells to one value; NaN without any."""
     values = cells.value[np.isfinite(cells.value)].to_numpy()
     if number.cells is not None and len(values) != number.cells:
         raise PaperError(
@@ -346,7 +344,6 @@ FORMULAS.globals = {"abs": abs, "max": max, "min": min, "pi": math.pi, "sqrt": m
 
 
 def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
-    """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
     known = {key: math.nan if one["value"] is None else one["value"] for key, one in found.items()}
     try:
         value: Any = FORMULAS.compile_expression(text, undefined_to_none=False)(**known)

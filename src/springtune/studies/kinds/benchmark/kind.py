@@ -132,7 +132,6 @@ def _tasks(study):
 
 
 def _code_keys(approaches):
-    """Keys of the code that measures a scene."""
     pairs = [approach.split("/") for approach in approaches if "/" in approach]
     # What the approaches do not name is solved and timed on these.
     definitions = {"delingette", "lattice", *(definition for definition, _ in pairs)}

@@ -130,7 +130,6 @@ def measure(scene, cases, most_seconds):
 
 
 def _failed_case(message, status=Status.FAILED):
-    """Result of a case without numbers."""
     return {"status": int(status), "message": message}
 
 
@@ -224,7 +223,6 @@ def _problem(scene, mesh, definition):
 
 
 def _mesh(scene, size, clock):
-    """Make a mesh of equilateral rows."""
     with clock("meshing"):
         mesh = structured(scene.beam.length, scene.beam.height, size)
         mesh.edges  # noqa: B018  computed when first asked for

@@ -169,7 +169,6 @@ def _sensitivity_title(panel, root, selection, swept):
 
 
 def _reason_without_curve(curves):
-    """Reason why no curve of a figure has an error."""
     if 1 in curves.status.values:
         return "solved, but without a reference there is no error"
     messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
@@ -310,7 +309,6 @@ def title_of_errors(root, selection):
 
 
 def _line_styles(root):
-    """Line style of each definition."""
     return {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
 
 

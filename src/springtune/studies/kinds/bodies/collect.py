@@ -186,7 +186,6 @@ def _outline_row(points, moved):
 
 
 def _beam_groups(study, folder):
-    """Groups of beams."""
     axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
     read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
     answers = {one: read(one.beam, one.material, one.load) for one in study.references}  # for 1 N: each is read once
@@ -218,7 +217,6 @@ def _beam_groups(study, folder):
 
 
 def _body_rows(study):
-    """Rows of materials and beams."""
     for one in {scene.material for scene in study.scenes}:
         own = {name: getattr(one, name) for name in ("young_modulus", "poisson_ratio", "density")}
         yield {"material": one.name} | own | {f"material_{name}": value for name, value in own.items()}
@@ -245,7 +243,6 @@ def _comment(data, answers):
 
 
 def _reference_rows(study, answers):
-    """Rows of references."""
     for one, result in answers.items():
         labels, message = study.labels(one), objection(result, one.force, "nonlinear")
         for kinematics in study.axes["kinematics"]:
@@ -291,7 +288,6 @@ def _scene_rows(study, folder, answers):
 
 
 def _printed_rows(study):
-    """Rows of the paper's printed cells that the study has."""
     own = [name for name in ROOT.variables if name.startswith(PRINTED_PREFIX)]
     for cell in study.printed:
         labels = {name: getattr(cell, name) for name in CELL}
@@ -300,7 +296,6 @@ def _printed_rows(study):
 
 
 def _curve_rows(study, folder, answers):
-    """Rows of sensitivity curves."""
     for mesh, curves in bodies.curves_by_mesh(study).items():
         tasks = [bodies.curve_task(study, curve) for curve in curves]
         path = folder / "curves" / f"{bodies.stem(mesh)}.h5"
@@ -321,13 +316,11 @@ def _curve_rows(study, folder, answers):
 
 
 def _small_strain_name(study):
-    """Name of the small-strain reference, by the planes of the materials."""
     planes = {one.material.plane for one in study.references}
     return "small-strain" if len(planes) > 1 else f"small-strain-plane-{planes.pop()}"
 
 
 def _finite_reference_rows(study, folder):
-    """Rows of references at finite strain."""
     for one, kind in product(study.references, study.further_references):
         result = _finite_reference(folder, one, kind)
         values = {f"reference_{name}": result.get(name) for name in ("message", "displacement", "error_estimate")}
@@ -389,7 +382,6 @@ def _rest_rows(study, folder):
 
 
 def _shape_groups(study, folder):
-    """Groups of shapes."""
     shapes = study.shapes
     answers = {case: _shape_reference(study, folder, *case) for case in shapes.referred}
     rows = [*_quantity_rows(shapes), *_shape_reference_rows(study, answers), *_shape_scene_rows(study, folder, answers)]
@@ -408,7 +400,6 @@ def _shape_reference(study, folder, *case, arrays=()):
 
 
 def _quantity_rows(shapes):
-    """Rows that describe the quantities of shapes."""
     for shape, load in dict.fromkeys((one.shape, one.load) for one in shapes.scenes):
         yield {"shape": shape, "shape_thickness": shapes.shape[shape].thickness}
         for one in shapes.shape[shape].loads[load].quantities:
@@ -429,7 +420,6 @@ def _shape_objection(result, kinematics):
 
 
 def _shape_reference_rows(study, answers):
-    """Rows of references."""
     for (shape, material, load), result in answers.items():
         labels = {"shape": shape, "material": material, "load": load}
         whys = [*_reasons(study.shapes, shape, load, result), _shape_objection(result, "nonlinear")]
@@ -472,7 +462,6 @@ def _reference_values(result, quantity):
 
 
 def _shape_scene_rows(study, folder, answers):
-    """Rows of meshes and scenes."""
     for file, scenes in bodies.shape_scenes_by_mesh(study).items():
         yield {name: getattr(scenes[0], name) for name in MESH_AXES} | stored.read_notes(folder / "meshes", file)
         keys = {one: bodies.shape_scene_task(study, one)["key"] for one in scenes}
@@ -483,7 +472,6 @@ def _shape_scene_rows(study, folder, answers):
 
 
 def _rows_of_shape_scene(shapes, one, result, reference):
-    """Rows of a scene."""
     labels, case, whys = vars(one), shapes.shape[one.shape].loads[one.load], []
     if reference:
         whys = [f"no reference: {why}" for why in _reasons(shapes, one.shape, one.load, reference)]
@@ -505,7 +493,6 @@ def _error(value, reference):
 
 
 def _shape_fields(study, folder):
-    """Group of the drawn networks."""
     drawn = [one for one in study.shapes.scenes if one in bodies.drawn_scenes(study)]
     cases = bodies.group_by(drawn, lambda one: f"{one.shape}, {one.load}")
     rows = [{"case": case} | row for case, scenes in cases.items() for row in _case_rows(study, folder, scenes)]

@@ -502,7 +502,6 @@ def _axes(found):
 
 
 def _extents(shape, file):
-    """Text of the extents of a shape or of its mesh file."""
     if not file:
         return size_text(*np.ptp(shape.extent, axis=0))
     from springtune.mesh.formats import read_shape  # here: few studies have files
@@ -579,7 +578,6 @@ def summary(study: Study, further: list[list[object]]) -> str:
 
 
 def _count_solutions(study: Study) -> str:
-    """Text of the number of finite-element solutions and interpolants."""
     problems = {
         unit_problem(one.beam, one.material, LOADS[one.load].kind)
         for one in study.references
@@ -596,7 +594,7 @@ def _grid_rows(study: Study) -> list[list[object]]:
     for grid in study.grids:
         scenes = set(grid.scenes)
         references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
-        counted = scenes, scenes - seen, {scene.mesh for scene in scenes}, references, grid.curves
-        rows.append([grid.name, *map(len, counted)])
+        meshes = {scene.mesh for scene in scenes}
+        rows.append([grid.name, len(scenes), len(scenes - seen), len(meshes), len(references), len(grid.curves)])
         seen |= scenes
     return rows

@@ -63,7 +63,6 @@ def solve_unit_problem(task, fields=True):
 
 
 def _solve_finite_strain(task):
-    """Result at finite strain."""
     # Here, since few studies need it.
     from springtune.reference.finite_strain import FiniteStrainError, solve_finite_strain
 

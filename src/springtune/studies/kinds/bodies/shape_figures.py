@@ -156,7 +156,6 @@ def _draw_errors(panels, cut, name, points):
 
 
 def _reason_without_error(cut):
-    """Reason why a quantity has no error."""
     states = style.status_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"

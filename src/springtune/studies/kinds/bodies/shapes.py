@@ -427,7 +427,6 @@ def _segments(sides):
 
 
 def _hole(hole):
-    """A hole of a config."""
     if hole.circle is None:
         return Hole(_segments(hole.outline), hole.part or "")
     return Hole.circle(hole.circle.centre, hole.circle.radius, hole.group or "", hole.part or "")
@@ -498,7 +497,6 @@ def expand(config, declared):
 
 
 def _case(one):
-    """Shape, material and load of a scene."""
     return one.shape, one.material, one.load
 
 
@@ -644,7 +642,6 @@ def _check_file(name, shape, file, path, problems, extents):
 
 
 def _check_stems(config, problems):
-    """Check that joined names of files differ."""
     stems = {}
     for name, shape in config.shapes.items():
         for load in shape.loads:

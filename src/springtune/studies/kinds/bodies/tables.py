@@ -59,12 +59,10 @@ NETWORK_COLUMNS = {
 
 
 def _swept_columns(dimensions):
-    """Swept parameters and their factors, by column."""
     return {column: (name, unit) for name, (_, column, unit) in SWEPT_SHOWN.items() if name in dimensions}
 
 
 def _scene_table(data, selection):
-    """Table of the scenes of a load, mesh type and material."""
     numbers = np.unique(data.paper_table.values[np.isfinite(data.paper_table.values)])
     number = int(numbers[0]) if len(numbers) == 1 else None
     swept = [name for name in SWEPT if name in data.status.dims]
@@ -203,7 +201,6 @@ def _in_fitting_unit(row):
 
 
 def _shape_table(tree):
-    """Table of the quantities of shapes."""
     data = tree["shapes"].to_dataset()
     present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
     present = present.transpose(*SCENE_AXES, "quantity")

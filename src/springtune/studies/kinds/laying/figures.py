@@ -60,7 +60,6 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
 
 
 def _draw_row(row, laid, cell, names):
-    """Draw the panels of one loading and friction."""
     shape, area, elongation = row
     friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
     style.add_note(shape, [_draw_shape(shape, laid, names)])

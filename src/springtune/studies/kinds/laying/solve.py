@@ -49,7 +49,6 @@ def solve(task):
 
 
 def _strip_result(task, size):
-    """Lay a strip on a mesh; a failure has a status and a message."""
     made = {
         "strip": Strip(**task["strip"]),
         "trapezoid": Trapezoid(**task["trapezoid"]),

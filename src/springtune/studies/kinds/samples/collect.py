@@ -70,7 +70,6 @@ def _read_results(sample, folder):
 
 
 def _frame(found):
-    """Table of the arrays and messages of a block."""
     frame = pd.DataFrame({name: values for name, values in found.items() if name != "messages"})
     return frame.assign(message=[found.get("messages", {}).get(str(row), "") for row in frame.index])
 
@@ -144,7 +143,6 @@ def _quantities(sample, data):
 
 
 def _indices(sample, data):
-    """Yield the Sobol indices of each quantity, load and definition."""
     for labels, values in _quantities(sample, data):
         rows = values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)

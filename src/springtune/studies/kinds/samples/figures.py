@@ -15,7 +15,6 @@ INDEX_LIMITS = -0.3, 1.5
 
 
 def _parameter_name(name):
-    """Name of a parameter on an axis."""
     return PARAMETER_WORDS.get(name, name.replace("_", " "))
 
 

@@ -1,14 +1,12 @@
 """Stage `interpolate`: references of a sample's beams as a function of aspect and Poisson's ratio, or one by one."""
 
 from pathlib import Path
-from typing import Any
 
-from ...runs.attempts import Attempts
 from ..bodies.reference import make_interpolant
 from .designs import draw
 
 
-def run(content: dict[str, Any], attempts: Attempts) -> None:
+def run(content, attempts):
     """Build the missing interpolants."""
     for file in content["files"]:
         (task,), pairs = file["tasks"], set()
@@ -19,6 +17,6 @@ def run(content: dict[str, Any], attempts: Attempts) -> None:
         make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, attempts)
 
 
-def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
+def problem_key(interpolant, aspect_ratio, nu):
     """Key of a reference that is solved alone, in the file of the interpolant that could not be built."""
     return f"{interpolant} {float(aspect_ratio)!r} {float(nu)!r}"

@@ -284,7 +284,6 @@ def block_key(sample, first, last):
 
 @cache
 def _code_of_networks(mesh_type, definition):
-    """Key of the code that solves networks of a mesh type and definition."""
     return hash_of(stage_key(SOLVE), mesh_type_key(mesh_type), definition_key(definition))
 
 

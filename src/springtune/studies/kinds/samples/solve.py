@@ -127,7 +127,6 @@ def _solve_mesh(block, box, rows, like, scaling, attempts):
 
 
 def _failed(why):
-    """Result of a scene that fails."""
     return {"displacement": np.nan, "status": Status.FAILED, "message": why}
 
 

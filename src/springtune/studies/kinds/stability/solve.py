@@ -99,7 +99,6 @@ class Setup:
 
 @lru_cache(maxsize=1)
 def _mesh_cache(mesh, thickness):
-    """Cache of the last mesh."""
     return MeshCache(mesh, thickness)
 
 
@@ -115,7 +114,6 @@ def _displacement(found, pattern):
 
 
 def _noise(motion, size=1e-6, seed=0):
-    """Random displacements of the free particles."""
     return size * np.random.default_rng(seed).standard_normal(motion.network.held.shape) * ~motion.network.held
 
 
@@ -188,7 +186,6 @@ def maps(setup):
 
 
 def _behaviour(motion, integrator, step):
-    """Flag of the behaviour of noise in a run."""
     start = _noise(motion)
     count = 400 if integrator in EXPLICIT else 60
     found = motion.run(integrator, step, count, start)
