@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from springtune.safe_io.files import write_bytes, write_json
 
 from ..output.text import cell_text
 from . import PaperError, check_typst, numbers
-from .numbers import HASH_DIGITS, Dataset, dataset_of, validated
+from .numbers import HASH_DIGITS, Dataset, Entry, dataset_of, validated
 
 MAIN = "main.typ"
 
@@ -66,13 +65,12 @@ def _check_texts(source: Path) -> None:
     """Raise if numbers are typed into the text."""
     if not (source / MAIN).is_file():
         raise PaperError(f"{source / MAIN}: there is no such file; give the folder of a paper's source")
-    found = [
+    if found := [
         f"{path}:{line}: '{number}' is typed; declare it in numbers.yaml, or printed.yaml, and write #n(\"its name\")"
         for path in sorted(source.glob("*.typ"))
         if path.name != "template.typ"
         for line, number in typed_numbers(path.read_text(encoding="utf-8"))
-    ]
-    if found:
+    ]:
         raise PaperError("\n".join(found))
 
 
@@ -129,10 +127,8 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
 # -- figures -----------------------------------------------------------------------------------------------------------
 
 
-class Drawing(BaseModel):
+class Drawing(Entry):
     """Declaration of a figure: a public plot function, a study and its selection, or a script of ``examples/``."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     plot: str = ""
     study: str = ""
@@ -151,7 +147,6 @@ def draw(
 
 
 def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples: Path) -> bytes:
-    import matplotlib
     import matplotlib.pyplot as plt
 
     from ..output.style import SETTINGS
@@ -159,7 +154,7 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
     if bool(drawing.example) == bool(drawing.plot):
         raise PaperError(f"{name}: give a plot, or the example that draws it, one of both")
     # Fonts as publishers take them.
-    with matplotlib.rc_context(SETTINGS | {"pdf.fonttype": 42}):
+    with plt.rc_context(SETTINGS | {"pdf.fonttype": 42}):
         if drawing.example:
             figure = _example_figure(examples / f"{drawing.example}.py", name)
         else:

@@ -106,7 +106,13 @@ REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
 """Reductions of several cells, without empty ones."""
 
 
-class Number(BaseModel):
+class Entry(BaseModel):
+    """An entry of a file of a paper."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Number(Entry):
     """Declaration of a number, or of a part of a table's, which is the product of its rows and columns.
 
     `variable` includes its group, as in ``sensitivity/best_stiffness``. `at` maps dimensions to labels; cells of a list
@@ -114,8 +120,6 @@ class Number(BaseModel):
     ``status!=not_requested``. `cells` is the number of values that `reduce` needs. `marks` maps a mark to a variable
     whose text or status sets it. `title` and `group` belong to tables; ``{beam}`` stands for its label.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     study: str = ""
     variable: str = ""
@@ -151,20 +155,16 @@ class Number(BaseModel):
         return f"{self.reduce} {self.study}:/{self.variable}[{labels}]".strip()
 
 
-class Printed(BaseModel):
+class Printed(Entry):
     """A number from another publication."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     printed: str
     unit: Literal[tuple(TEXT_UNITS)] = ""  # type: ignore[valid-type]  # the keys
     where: str
 
 
-class Table(BaseModel):
+class Table(Entry):
     """Declaration of a table; `rows` and `columns` override its common entries."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     all: dict[str, Any] = {}
     rows: list[dict[str, Any]]
@@ -181,8 +181,7 @@ def load(path: Path) -> dict[str, Any]:
 
 def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: Mapping[str, Dataset]) -> dict[str, Any]:
     """Evaluate all numbers of a paper."""
-    twice = sorted(set(declared) & set(printed))
-    if twice:
+    if twice := sorted(declared.keys() & printed.keys()):
         raise PaperError(f"{', '.join(twice)}: declared twice, in numbers.yaml and printed.yaml; rename one")
     found: dict[str, Any] = {}
     for name, entry in printed.items():
