@@ -295,7 +295,7 @@ def _axes(
     # A study kind may have labels that no beam has, such as loads of its own.
     more = {name: [*chain.from_iterable(labels.get(name, ()) for labels in further)] for name in used}
     found = {name: {*labels, *more[name]} for name, labels in used.items()}
-    own = {name: values for labels in further for name, values in labels.items() if name not in used}
+    own = {name: tuple(values) for labels in further for name, values in labels.items() if name not in used}
     order = {name: dict.fromkeys([*labels, *more[name]]) for name, labels in ranks.items()}
     axes = {name: tuple(label for label in labels if label in found[name]) for name, labels in order.items()}
     return axes | {name: tuple(sorted(found[name])) for name in ("mesh_size", *names)} | own

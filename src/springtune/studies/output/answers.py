@@ -34,8 +34,8 @@ def requested_cells(group: Variables, finite: Variables | None = None, error: st
     if "reference_applies" in cells:
         valid = np.where(cells["reference_applies"] == 1, valid, np.nan)
     if finite and own_laws(finite):
-        own, law, known = own_law(finite)
-        places["reference"] = law[at := tuple(places[one] for one in own)]
+        along, law, known = own_law(finite)
+        places["reference"] = law[at := tuple(places[one] for one in along)]
         own, values = finite["deformation_error"]
         errors = np.where(known[at], values[tuple(places[one] for one in own)], np.nan)
         valid = np.where(cells["kinematics"] == "linear", valid, errors)
@@ -57,7 +57,7 @@ def own_law(finite: Variables) -> tuple[list[str], np.ndarray, np.ndarray]:
     known = np.isfinite(np.moveaxis(values, [*dims].index("reference"), 0))[numbers]
     if laws[-1] == STRAINED_REFERENCE:
         known[-1] &= broadcast(own, *finite["material_plane"]) == "strain"
-    return own, np.select([*known], numbers, numbers[-1]), known.any(axis=0)
+    return own, np.select([*known], numbers, numbers[-1]), np.logical_or.reduce(known)
 
 
 class DefinitionErrors(NamedTuple):

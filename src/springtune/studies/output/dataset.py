@@ -458,7 +458,7 @@ def network(data: xr.DataTree, labels: dict[str, Label]) -> xr.Dataset:
         there = found[name].notnull()
         found = found.isel({dimension: there.any([one for one in there.dims if one != dimension]).values})
     for name in (SPRING_NODES, CELL_NODES):
-        connectivity = found[name].fillna(NO_NODE).astype(NO_NODE.dtype)
+        connectivity = found[name].fillna(NO_NODE).astype("int32")
         connectivity.encoding = {"_FillValue": NO_NODE, "dtype": "int32"}
         found[name] = connectivity.assign_attrs(found[name].attrs)
     return found.assign_attrs(Conventions="CF-1.11 UGRID-1.0")

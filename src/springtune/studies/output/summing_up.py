@@ -67,7 +67,7 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
 Cells = list[tuple[str, str]]
 
 
-def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
+def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, Mapping[Status, int], Mapping[Status, Cells]]]:
     """Subject, counts by flag and unsolved cells of each status variable."""
     for variable in data.data_vars.values():
         label = str(variable.name)
@@ -75,13 +75,13 @@ def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, dict[Status, int
         if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
             continue
         flags, messages = variable.values, data[message].values
-        found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
-        found = {status: number for status, number in found.items() if number}
-        holes = [status for status in found if status != Status.SOLVED]
-        lost = {status: _cells(data, variable.dims, flags == status, messages) for status in holes}
+        places = {status: flags == status for status in Status if status and (flags == status).any()}
+        lost: dict[Status, Cells] = {
+            one: _cells(data, variable.dims, at, messages) for one, at in places.items() if one != Status.SOLVED
+        }
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == ROOT_GROUP else ", ".join(filter(None, (name.strip("/"), part)))
-        yield what, found, lost
+        yield what, {status: int(at.sum()) for status, at in places.items()}, lost
 
 
 def _cells(data: xr.Dataset, dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
