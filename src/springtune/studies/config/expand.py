@@ -1,12 +1,12 @@
 """Load a study from YAML: validate it, and expand its sections into meshes, scenes and curves, each once and sorted."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from pydantic import AfterValidator, Field
 
@@ -84,13 +84,12 @@ def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Pr
     return found
 
 
-@dataclass(frozen=True)
-class Declared:
+class Declared(NamedTuple):
     """Bodies and materials that a study declares, by name; `folder` is where its file names start."""
 
     beams: dict[str, Beam]
     materials: dict[str, AnyMaterial]
-    folder: Path = Path()
+    folder: Path
 
 
 def declared(config: StudyConfig, problems: Problems) -> Declared:

@@ -1,11 +1,10 @@
 """Bounded YAML with the line of every key, and messages on it that name line, key, value and remedy."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -128,8 +127,7 @@ def words(annotation: Any) -> str:
 SECTION = "a section"
 
 
-@dataclass(frozen=True)
-class OrSection:
+class OrSection(NamedTuple):
     """Note of a value that may be a section, which a validator reads."""
 
     section: type[BaseModel]

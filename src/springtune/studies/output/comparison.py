@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -50,8 +50,7 @@ class Tolerance:
                 raise ValueError(f"{name}: {value} is no tolerance; give a number from 0 on")
 
 
-@dataclass(frozen=True)
-class Change:
+class Change(NamedTuple):
     """A changed cell, or a curve's most changed point; `excess` is the difference over the tolerance, or infinite."""
 
     group: str
@@ -70,8 +69,7 @@ class Change:
         return self.after - self.before
 
 
-@dataclass(frozen=True)
-class VariableChanges:
+class VariableChanges(NamedTuple):
     """Changes of one variable; `rows` are the largest."""
 
     name: str
@@ -80,8 +78,7 @@ class VariableChanges:
     rows: list[Change]
 
 
-@dataclass(frozen=True)
-class CellsOfOne:
+class CellsOfOne(NamedTuple):
     """Cells of only one dataset: their number, and the labels of the first."""
 
     count: int = 0
@@ -109,8 +106,7 @@ class GroupChanges:
         return any([*counts, *self.variables, self.labels, self.unlike])
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """Differences of two datasets; differing `attributes` do not count as different results."""
 
     groups: list[GroupChanges]

@@ -399,11 +399,12 @@ def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> li
     return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
 
+Scaled = Mapping[str, tuple[str, float]]
+"""Variable and factor by the column of a table."""
+
+
 def table_rows(
-    data: xr.Dataset,
-    present: xr.DataArray,
-    names: Collection[str],
-    scaled: Mapping[str, tuple[str, float]] = MappingProxyType({}),
+    data: xr.Dataset, present: xr.DataArray, names: Collection[str], scaled: Scaled = MappingProxyType({})
 ) -> list[dict[str, Any]]:
     """Rows of the present cells: labels and variables by name, and variables by column times a factor."""
     variables = [name for name in (*names, *(name for name, _ in scaled.values())) if name in data.variables]

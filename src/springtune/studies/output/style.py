@@ -152,8 +152,7 @@ def panels(
 
 def size(figure: Figure | SubFigure) -> tuple[float, float]:
     """Width and height of a figure or subfigure [inch]."""
-    box = figure.bbox.transformed(figure.dpi_scale_trans.inverted())
-    return box.width, box.height
+    return figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
 
 
 def png_and_pdf(figure: Figure) -> dict[str, bytes]:
@@ -197,9 +196,8 @@ def power_of_ten(largest: float) -> tuple[float, str]:
 def wrap_to_width(text: str, room: float, size: float | None = None) -> str:
     """Wrap a text, small if no size is given, at spaces to a width [inch]; a number keeps its unit."""
     characters = max(1, int(room * POINTS_PER_INCH / (CHARACTER_WIDTH * (size or SMALL_TEXT))))
-    lines = textwrap.wrap(
-        SPACE_BEFORE_UNIT.sub("\x1f", text), characters, break_long_words=False, break_on_hyphens=False
-    )
+    kept = SPACE_BEFORE_UNIT.sub("\x1f", text)
+    lines = textwrap.wrap(kept, characters, break_long_words=False, break_on_hyphens=False)
     return "\n".join(lines).replace("\x1f", " ")
 
 
@@ -247,9 +245,6 @@ def count_statuses(flags: np.ndarray) -> dict[str, int]:
     return {status_words(flag): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
 
 
-# -- texts -------------------------------------------------------------------------------------------------------------
-
-
 def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:
     """Name lines in the order of their ends, and write notes below; without lines write `why`."""
     ends = {}
@@ -260,8 +255,7 @@ def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterab
     if why and not ends:
         write_reason(panel, why)
         return
-    handles = [*sorted(ends, key=lambda line: -ends[line]), *key]
-    if handles:
+    if handles := [*sorted(ends, key=lambda line: -ends[line]), *key]:
         arranged = panel.figure.get_layout_engine() is not None
         place: Any = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
         texts = [wrap_to_panel(panel, [str(one.get_label())], share=WIDEST_NAME_SHARE) for one in handles]
@@ -278,9 +272,8 @@ def add_note(panel: Axes, texts: Iterable[str]) -> None:
 
 def write_reason(panel: Axes, text: str, bare: bool = True) -> None:
     """Write into an empty panel what is missing and why."""
-    panel.text(
-        0.5, 0.5, wrap_to_panel(panel, [text], 8), transform=panel.transAxes, ha="center", va="center", color="0.25"
-    )
+    place: Any = {"transform": panel.transAxes, "ha": "center", "va": "center"}
+    panel.text(0.5, 0.5, wrap_to_panel(panel, [text], 8), color="0.25", **place)
     if bare:
         panel.tick_params(which="both", length=0, labelbottom=False, labelleft=False)
         panel.grid(False)

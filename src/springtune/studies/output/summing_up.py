@@ -40,11 +40,7 @@ COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "
 def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
     """Summarise a study's cells, with the errors of at most so many definitions."""
     states = [state for name, data in groups.items() for state in _states(name, data)]
-    rows = [
-        [what, str(sum(found.values())), ", ".join(f"{number} {_words(status)}" for status, number in found.items())]
-        for what, found, _ in states
-        if found
-    ]
+    rows = [[what, str(count), said] for what, count, said, _ in states if count]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
     for name, data in groups.items():
         if name.strip("/") in COMPARED:
@@ -54,8 +50,7 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
     holes = []
-    for what, found, lost in states:
-        count = sum(found.values())
+    for what, count, _, lost in states:
         for status, cells in lost.items():
             lines += ["", f"{what}, {_words(status)}: {len(cells)} of {count}", *_cell_lines(cells)]
         holes += [f"{sum(map(len, lost.values()))} of {count} {what}"] if lost else []
@@ -67,8 +62,8 @@ def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = DEFINI
 Cells = list[tuple[str, str]]
 
 
-def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, Mapping[Status, int], Mapping[Status, Cells]]]:
-    """Subject, counts by flag and unsolved cells of each status variable."""
+def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, int, str, Mapping[Status, Cells]]]:
+    """Subject, number of cells, their statuses in words and unsolved cells of each status variable."""
     for variable in data.data_vars.values():
         label = str(variable.name)
         message = label.removesuffix("status") + "message"
@@ -81,7 +76,8 @@ def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, Mapping[Status, 
         }
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == ROOT_GROUP else ", ".join(filter(None, (name.strip("/"), part)))
-        yield what, {status: int(at.sum()) for status, at in places.items()}, lost
+        said = ", ".join(f"{at.sum()} {_words(status)}" for status, at in places.items())
+        yield what, sum(int(at.sum()) for at in places.values()), said, lost
 
 
 def _cells(data: xr.Dataset, dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
