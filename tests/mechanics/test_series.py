@@ -7,7 +7,7 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.mechanics.continuation import follow, smallest_share
-from springtune.mechanics.series import StablePath, trace
+from springtune.mechanics.series import StablePath
 from springtune.mechanics.statics import SERIES_ORDER, Expansion, StaticProblem
 from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import best_stiffness
@@ -27,7 +27,7 @@ RATIOS = np.linspace(0.4, 1.6, 61)
 def test_curve_agrees_with_separate_solves(mesh_type, length, height, size, force):
     problem, weights = beam_problem(mesh_type, length, height, size)
     targets = force / (RATIOS * K)
-    values, stable = trace(problem, weights, targets)
+    values, stable = (path := StablePath(problem, weights, targets)).values, path.stable
     assert np.isfinite(values).all() and stable.all()
     for place in range(0, 61, 12):
         found = problem.newton(targets[place], targets[place] * problem.slope)
@@ -85,7 +85,7 @@ def random_curve(seed):
 def check(seed):
     """What a curve says is stable is, to 1e-6, and what it has not is not on the stable path."""
     problem, weights, targets = random_curve(seed)
-    values, stable = trace(problem, weights, targets)
+    values, stable = (path := StablePath(problem, weights, targets)).values, path.stable
     assert np.isfinite(values[stable]).all()
     last = np.argmax(np.abs(targets * stable))  # the nearest to where stability ends
     for place in {0, 10, 25, 40, 60, int(last)}:
@@ -112,7 +112,7 @@ def test_curve_next_to_buckling_is_followed_where_the_beam_bends():
     """60x20 of rows that are no mirror image bends before it buckles; the path turns at k = 798, a limit point."""
     problem, weights = beam_problem("structured", 0.06, 0.02, 2.5e-3)
     stiffness = RATIOS * COEFFICIENT * 1e3
-    values, stable = trace(problem, weights, -0.548311 / stiffness)
+    values, stable = (path := StablePath(problem, weights, -0.548311 / stiffness)).values, path.stable
     assert (stable == (stiffness > 798.3)).all()
     for place in np.flatnonzero(stable)[:4]:
         assert values[place] == pytest.approx(on_the_path(problem, weights, -0.548311 / stiffness[place]), rel=1e-6)
@@ -175,7 +175,7 @@ def test_one_path_is_many_solves_worth():
 
     loads = 2e4 / (0.866 * 2.1e8 * np.linspace(0.4, 1.6, 201))
     together, apart = problem(), [problem() for _ in loads[::50]]
-    values, stable = trace(together, pattern, loads)
+    values, stable = (path := StablePath(together, pattern, loads)).values, path.stable
     found = [one.nonlinear(load) for one, load in zip(apart, loads[::50])]
     assert stable.all()
     np.testing.assert_allclose(values[::50], [np.tensordot(one.displacements, pattern, axes=2) for one in found],

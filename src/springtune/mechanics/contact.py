@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -157,15 +157,11 @@ class Body:
         return self._solver[1]
 
 
-@dataclass
 class Obstacle:
     """Rigid polygon; `points` has shape (n, 2), counter-clockwise [m]."""
 
-    points: np.ndarray
-    outline: np.ndarray = field(init=False)
-
-    def __post_init__(self) -> None:
-        numbers = np.arange(len(self.points))
+    def __init__(self, points: np.ndarray) -> None:
+        self.points, numbers = points, np.arange(len(points))
         self.outline = np.stack([numbers, np.roll(numbers, -1)], axis=1)
         self.neighbours = neighbours(self.outline)
 
@@ -205,14 +201,8 @@ class Contacts(NamedTuple):
     gaps: np.ndarray
 
 
-class _Quadratic(NamedTuple):
-    """Problem of a Newton step: by body tangent, missing forces and rows of its contacts; gaps, and likely contacts."""
-
-    tangents: list[csc_array]
-    missing: list[np.ndarray]
-    rows: list[csc_array]
-    gaps: np.ndarray
-    likely: np.ndarray
+_Quadratic = tuple[list[csc_array], list[np.ndarray], list[csc_array], np.ndarray, np.ndarray]
+"""Problem of a Newton step: by body tangent, missing forces and rows of its contacts; gaps, and likely contacts."""
 
 
 class Contact:
@@ -330,19 +320,15 @@ class Contact:
     @property
     def penetration(self) -> float:
         """Largest depth of a corner inside another body or below the floor [m]."""
-        deepest = 0.0
-        for owner, first in enumerate(self.all):
-            places = first.points[np.unique(first.outline)]
-            if self.floor and owner < len(self.bodies):
-                deepest = max(deepest, -places[:, 1].min())
-            for target, second in enumerate(self.all):
-                if target != owner and min(owner, target) < len(self.bodies):
-                    deepest = max(deepest, _depth(places, *second.points[second.outline].transpose(1, 0, 2)))
-        return float(deepest)
+        corners = [one.points[np.unique(one.outline)] for one in self.all]
+        sides = [one.points[one.outline].transpose(1, 0, 2) for one in self.all]
+        depths = [-places[:, 1].min() for places in corners[: len(self.bodies)] if self.floor]
+        pairs = [pair for pair in permutations(range(len(self.all)), 2) if min(pair) < len(self.bodies)]
+        return float(max(0.0, *depths, *(_depth(corners[owner], *sides[target]) for owner, target in pairs)))
 
     # -- mechanics -----------------------------------------------------------------------------------------------------
 
-    def solve(self, first: float = 0.02, smallest: float = SMALLEST_LOAD_STEP) -> None:
+    def solve(self, first: float = 0.02) -> None:
         """Find the equilibrium under the whole load, in the longest load steps [1] that converge."""
         step = first
         while self.share < 1.0:
@@ -353,7 +339,7 @@ class Contact:
                 for body, before in zip(self.bodies, kept):
                     body.displacements = before
                 step *= 0.35
-                if step < smallest:
+                if step < SMALLEST_LOAD_STEP:
                     raise ContactError(f"no equilibrium beyond {100 * self.share:.3g} % of the load")
                 continue
             self.share += step
@@ -395,7 +381,7 @@ class Contact:
         rows = self._rows(contacts, contacts.normals)
         try:
             tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
-            quadratic = _Quadratic(tangents, missing, rows, contacts.gaps, known > 0)
+            quadratic = tangents, missing, rows, contacts.gaps, known > 0
             found = self._solve_closed(quadratic) if near else None
             if found is None:
                 found = self._solve_opening(quadratic)

@@ -329,8 +329,7 @@ def relax(network: Network, load: np.ndarray, *, linear: bool = False, max_steps
     # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
     inertia = 0.3 * network.local_stiffness.max(axis=1, initial=0.0, where=~network.held)
     motion = Motion(network, inertia, load, linear=linear)
-    u = np.zeros(network.held.shape)
-    v = np.zeros_like(u)
+    u = v = np.zeros(network.held.shape)
     done, before = 0, None
     while done < max_steps:
         found = motion.run("central-difference", 1.0, STEPS_PER_ESTIMATE, u, v)
@@ -339,10 +338,8 @@ def relax(network: Network, load: np.ndarray, *, linear: bool = False, max_steps
             return replace(found, steps=done, message="dynamic relaxation diverged; use load steps or Newton's method")
         u, v = found.displacements, found.velocities
         if found.residual <= TOLERANCE:
-            if network.inverted(u):
-                status, message = "inverted", "triangles are inverted; use a smaller load"
-            else:
-                status, message = motion.judge_rest(u)
+            inverted = "inverted", "triangles are inverted; use a smaller load"
+            status, message = inverted if network.inverted(u) else motion.judge_rest(u)
             return replace(found, status=status, message=message, steps=done)
         resistance = -motion.missing(u)
         if before is not None:

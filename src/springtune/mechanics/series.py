@@ -44,12 +44,6 @@ PATH_DISTANCE = 0.02
 """Distance of a spring's vector from its prediction, over its length, beyond which a solve found another path."""
 
 
-def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weighted displacement at loads of one sign [m] on the path from rest, and where it is stable."""
-    path = StablePath(problem, weights, targets)
-    return path.values, path.stable
-
-
 class _Point(NamedTuple):
     """A predicted point, corrected; the tangent is that of the prediction."""
 
@@ -62,7 +56,9 @@ class _Point(NamedTuple):
 
 
 class StablePath:
-    """Stable part of an equilibrium path from rest, as far as the loads of `trace` need it.
+    """Stable part of an equilibrium path from rest, as far as some loads need it.
+
+    `values` are the weighted displacements at `targets`, loads of one sign [m], and `stable` tells where it is stable.
 
     It begins with the series about rest. Where that fails, as for a beam of an unsymmetric mesh next to buckling, a
     series predicts a point and a solve corrects it. Between two stable points of one series the path counts as stable

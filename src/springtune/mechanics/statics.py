@@ -113,7 +113,8 @@ class Expansion:
     def _extend(self, order: int) -> None:
         network = self._network
         series = self._d, self._length, self._inverse, self.coefficients, self.loads
-        d, length, inverse, coefficients, loads = (_grown(array, order + 1) for array in series)
+        grown = [np.concatenate([one, np.zeros((order + 1 - len(one), *one.shape[1:]))]) for one in series]
+        d, length, inverse, coefficients, loads = grown
         weight = network.stiffness * network.rest_lengths
         for n in range(self.order + 1, order + 1):
             right = self._load
@@ -245,13 +246,6 @@ class Expansion:
         with np.errstate(divide="ignore", invalid="ignore"):
             errors = np.maximum(np.abs(best - second), np.abs(second - third)) / np.abs(best)
         return best, np.where(np.isfinite(errors), errors, np.inf)
-
-
-def _grown(array: np.ndarray, length: int) -> np.ndarray:
-    """The array with zeros behind it along its first axis."""
-    grown = np.zeros((length, *array.shape[1:]))
-    grown[: len(array)] = array
-    return grown
 
 
 def _pade(series: np.ndarray, upper: int, lower: int) -> Callable[[np.ndarray], np.ndarray]:
