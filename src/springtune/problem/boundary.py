@@ -92,8 +92,8 @@ def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
 def forces(
     grouped: GroupedMesh,
     case: LoadCase,
-    thickness: float = 1.0,
-    densities: Mapping[str, float | None] | None = None,
+    thickness: float,
+    densities: Mapping[str, float | None],
     followers: bool = True,
 ) -> np.ndarray:
     """Return the forces of a load case on the particles at rest [N]; densities [kg/m3] by part are for gravity."""
@@ -109,11 +109,11 @@ def forces(
             half = 0.5 * pressure.pressure * thickness * np.stack([-apart[:, 1], apart[:, 0]], axis=1)
             np.add.at(field, edges, half[:, None, :])
     if any(case.gravity):
-        field += particle_masses(grouped, thickness, densities or {})[:, None] * case.gravity
+        field += particle_masses(grouped, thickness, densities)[:, None] * case.gravity
     return field
 
 
-def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def followed(grouped: GroupedMesh, case: LoadCase, thickness: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the edges (n, 2) with follower pressure, the body to the left, and it (n,) times the thickness [N/m]."""
     found = [(grouped.sides[one.group], one.pressure * thickness) for one in case.pressures if one.follower]
     edges, pressures = zip((no_cells(2), 0.0), *found)
@@ -175,8 +175,7 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
 def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
     """Return the cell of a named point, or the nearest one, and its corners' interpolation weights, sum 1."""
     mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
-    slack, found = POINT_TOLERANCE * np.ptp(mesh.points, axis=0).max(), None
-    best = -OUTSIDE_TOLERANCE
+    slack, best, found = POINT_TOLERANCE * np.ptp(mesh.points, axis=0).max(), -OUTSIDE_TOLERANCE, None
     for count, corners in mesh.cells.items():
         here = mesh.points[corners] - point
         # What has it is among the cells whose boxes are near.

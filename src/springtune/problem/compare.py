@@ -14,6 +14,9 @@ ROOT_TOLERANCE = 1e-10
 MOST_BISECTIONS = 12
 """Bisections in search of a best stiffness where a curve ends."""
 
+Solve = Callable[[float], float]
+"""Displacement at a stiffness."""
+
 
 def error_text(error: float) -> str:
     """Deformation error in words: two decimals below 10 %, otherwise three digits."""
@@ -62,11 +65,7 @@ class Best:
 
 
 def best_stiffness(
-    stiffness: np.ndarray,
-    displacement: np.ndarray,
-    stable: np.ndarray,
-    reference: float,
-    solve: Callable[[float], float],
+    stiffness: np.ndarray, displacement: np.ndarray, stable: np.ndarray, reference: float, solve: Solve
 ) -> Best:
     """Find the stiffness [N/m] at which the stable part of a curve meets the reference, by ``solve(k)`` in 1/k."""
     if not np.isfinite(reference):
@@ -101,9 +100,7 @@ def best_stiffness(
     return Best(np.nan, Status.FAILED, f"the curve does not meet the reference {between}; widen `sensitivity`")
 
 
-def _root(
-    solve: Callable[[float], float], reference: float, first: float, last: float, error_first: float, error_last: float
-) -> float:
+def _root(solve: Solve, reference: float, first: float, last: float, error_first: float, error_last: float) -> float:
     """Stiffness between two softnesses at which the displacement is the reference's."""
     known = {first: error_first, last: error_last}
     from scipy.optimize import brentq  # here: most jobs that compare look for no best stiffness
@@ -114,9 +111,7 @@ def _root(
     return float(1.0 / brentq(error, first, last, xtol=1e-15 * first, rtol=ROOT_TOLERANCE))
 
 
-def _last_root(
-    solve: Callable[[float], float], reference: float, softness: float, unsolved: float, error: float
-) -> float | None:
+def _last_root(solve: Solve, reference: float, softness: float, unsolved: float, error: float) -> float | None:
     """Stiffness between a softness that has an equilibrium and one that has none; None where there is no root."""
     for _ in range(MOST_BISECTIONS):
         middle = 0.5 * (softness + unsolved)

@@ -123,8 +123,7 @@ class LoadKind:
     @cached_property
     def case(self) -> LoadCase:
         """The kind as any load of a shape, whose groups are the sides of the rectangle; its force is 1 N."""
-        zeros = {side.name: [0.0 if axis in axes else None for axis in range(2)] for side, axes in self.held}
-        supports = (Support(side, *held) for side, held in zeros.items())
+        supports = (Support(side.name, *(0.0 if n in axes else None for n in range(2))) for side, axes in self.held)
         force = (1.0, 0.0) if self.axis == 0 else (0.0, 1.0)
         where = MIDDLE if self.pressed else self.loaded.name
         quantity = Quantity("displacement", "displacement", where, "xy"[self.axis])

@@ -87,11 +87,7 @@ SWEPT = {
 PLANES = "stress", "strain"
 """Plane stress and plane strain: the quantity that is zero across a sheet."""
 
-OF_BODIES = {
-    "thickness": "beam_thickness",
-    "young_modulus": "material_young_modulus",
-    "poisson_ratio": "material_poisson_ratio",
-}
+OF_BODIES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name in ("young_modulus", "poisson_ratio")}
 """Variable of a dataset that holds a parameter of beams or materials."""
 
 MOST_SCENES = 1_000_000

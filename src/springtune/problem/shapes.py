@@ -483,10 +483,8 @@ class Quantity:
         elif self.of or self.component:
             raise ValueError(f"{what}: {self.kind} is of the entire body; leave 'of' and 'component' out")
         if self.expected is not None:
-            kind = {"displacement": "length", "reaction": "force", "stress": "stress"}.get(self.kind)
-            if kind is None and isinstance(self.expected, str):
-                raise ValueError(f"{what}, expected: {self.expected!r}; give a number in SI units")
-            put(self, expected=quantity(self.expected, kind or "length", f"{what}, expected"))
+            dimension = {"displacement": "length", "reaction": "force"}.get(self.kind, self.kind)
+            put(self, expected=quantity(self.expected, dimension, f"{what}, expected"))
 
 
 @dataclass(frozen=True)
