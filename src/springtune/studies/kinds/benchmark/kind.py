@@ -134,11 +134,9 @@ def _tasks(study):
 def _code_keys(approaches):
     pairs = [approach.split("/") for approach in approaches if "/" in approach]
     # What the approaches do not name is solved and timed on these.
-    definitions = {"delingette", "lattice", *(definition for definition, _ in pairs)}
-    mesh_types = {"structured", *(mesh_type for _, mesh_type in pairs)}
-    springs = [definition_key(name) for name in sorted(definitions)]
-    meshes = [mesh_type_key(name) for name in sorted(mesh_types)]
-    return springs, meshes, program() if any(name.startswith("calculix") for name in approaches) else ""
+    definitions, mesh_types = zip(("delingette", "structured"), ("lattice", "structured"), *pairs)
+    springs, meshes = map(definition_key, sorted({*definitions})), map(mesh_type_key, sorted({*mesh_types}))
+    return [*springs], [*meshes], program() if any(name.startswith("calculix") for name in approaches) else ""
 
 
 def _figures(study):

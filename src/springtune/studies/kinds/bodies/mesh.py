@@ -15,7 +15,7 @@ def make(source):
         from .task_values import make_shape  # here: most studies have no shapes
 
         return make_shape(source)
-    return stored.make_beam(source)
+    return GroupedMesh(stored.make_beam(source))
 
 
 def run(content, attempts):
@@ -33,8 +33,6 @@ def run(content, attempts):
         if isinstance(made, dict):
             stored.write(folder, name, task["key"], None, made)
             continue
-        grouped = made if isinstance(made, GroupedMesh) else GroupedMesh(made)
-        mesh = grouped.mesh
+        mesh = made.mesh
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
-        known["edge_length"] = float(mesh.edge_lengths.mean())
-        stored.write(folder, name, task["key"], grouped, known)
+        stored.write(folder, name, task["key"], made, known | {"edge_length": float(mesh.edge_lengths.mean())})

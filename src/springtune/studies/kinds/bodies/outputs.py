@@ -43,10 +43,8 @@ def stems(study: Study) -> list[str]:
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
     found = [stem(dict(zip(TABLE_LABELS, labels)), numbers.get(labels)) for labels in chosen]
-    found += ["finite_strain"] if study.further_references else []
-    found += ["block"] if pressed(study) else []
-    found += ["shapes"] if study.shapes else []
-    return found
+    further = {"finite_strain": study.further_references, "block": pressed(study), "shapes": study.shapes}
+    return found + [name for name, there in further.items() if there]
 
 
 @cache_by_study

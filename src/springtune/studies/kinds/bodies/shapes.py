@@ -618,18 +618,14 @@ def _check_file(name, shape, file, path, problems, extents):
         warnings.warn(f"{message}, such as 'unit: 1 mm', or 'unit: 1 m'", AssumptionWarning, stacklevel=2)
     first, others = next(iter(extents.items()), (file.name, sides))
     if not np.allclose(sides, others, rtol=EXTENT_TOLERANCE):
-        message = (
-            f"{file.name} is {size_text(*sides)}, and {first} {size_text(*others)}; give files of one body and unit"
-        )
-        problems.add((*path, "file"), message)
+        what = f"{file.name} is {size_text(*sides)}, and {first} {size_text(*others)}"
+        problems.add((*path, "file"), f"{what}; give files of one body and unit")
     extents[file.name] = sides
     parts = parts_of(grouped)
     if len(parts) > 1 and not shape.parts:
         names, first = ", ".join(f"'{one}'" for one in parts if one), next(filter(None, parts))
-        problems.add(
-            (*path, "parts"),
-            f"{file} has parts {names}; give their materials, such as {{{first}: <material>}}; the rest has the grid's",
-        )
+        remedy = f"give their materials, such as {{{first}: <material>}}; the rest has the grid's"
+        problems.add((*path, "parts"), f"{file} has parts {names}; {remedy}")
     for part in sorted(set(shape.parts) - set(grouped.parts)):
         there = nearest(part, grouped.parts) if grouped.parts else "the file has none"
         problems.add((*path, "parts", part), f"unknown part '{part}'; {there}")
@@ -647,11 +643,9 @@ def _check_stems(config, problems):
         for load in shape.loads:
             other = stems.setdefault(f"{name}_{load}".casefold(), (name, load))
             if other != (name, load):
-                message = (
-                    f"figures of shape '{name}' under '{load}' and of '{other[0]}' under '{other[1]}' would have one "
-                    "name; rename a shape or a load"
-                )
-                problems.add(("shapes", name, "loads", load), message)
+                two = f"figures of shape '{name}' under '{load}' and of '{other[0]}' under '{other[1]}'"
+                remedy = "rename a shape or a load"
+                problems.add(("shapes", name, "loads", load), f"{two} would have one name; {remedy}")
 
 
 def _check_grid(config, grid, path, problems):
@@ -681,7 +675,7 @@ def _check_grid(config, grid, path, problems):
             most = f"{1e3 * min(wide, high):.4g} mm"
             problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
         check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
-    count = len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
-    count *= sum(len(grid.load or shape.loads) for shape in shapes.values())
+    count = sum(len(grid.load or shape.loads) for shape in shapes.values())
+    count *= len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
     if count > MOST_SHAPE_SCENES:
         problems.add(path, f"{count} scenes; a study has at most {MOST_SHAPE_SCENES} of shapes: {FEWER}")

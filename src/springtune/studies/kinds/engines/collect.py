@@ -6,16 +6,15 @@ import numpy as np
 
 from ...config.kind import declared_dimensions, declared_variables
 from ...output.dataset import Group
-from ...runs.plan import results
+from ...runs.plan import rows as stored_rows
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
 
-NETWORK, FACTOR = ("scene", "definition"), "stiffness_factor"
-RUN = (*NETWORK, "engine", *SETTING)
+FACTOR = "stiffness_factor"
+RUN = ("scene", "definition", "engine", *SETTING)
 
-SCENE_PARTS = ("beam", "mesh_type", "mesh_size", "material", "load", "force")
-RUN_COORDINATES = (*(f"scene_{part}" for part in SCENE_PARTS), "program")
-"""Variables that describe scenes and engines."""
+RUN_COORDINATES = [f"scene_{part}" for part in ("beam", "mesh_type", "mesh_size", "material", "load", "force")]
+"""Variables that describe scenes."""
 
 ENGINE_DIMENSIONS = declared_dimensions(__file__)
 """Dimensions of these groups."""
@@ -30,10 +29,9 @@ ENGINE_CURVES = Group("/engine_curves", CURVE_VARIABLES, ENGINE_DIMENSIONS, FLAG
 
 def groups(study, folder):
     """Build the groups of a dataset."""
-    runs = zip(study.parts["engines"], results(STAGE, study, folder), strict=True)
-    made, found = {}, [(run.of_curve, run.labels | result) for run, (_, result) in runs]
+    made, found = {}, [*zip(study.parts["engines"], stored_rows(STAGE, study, folder), strict=True)]
     for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
-        rows = [row for of_curve, row in found if of_curve == wanted]
+        rows = [row for run, row in found if run.of_curve == wanted]
         axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}
         curves = defaultdict(list)
         for row in rows if wanted else ():
@@ -41,7 +39,7 @@ def groups(study, folder):
         rows += [dict(zip(RUN, setting)) | _best_factor(points) for setting, points in curves.items()]
         if rows:
             shared = {name: study.axes[name] for name in study.axes.keys() - ENGINE_DIMENSIONS.keys()}
-            made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES])
+            made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES, "program"])
     return made
 
 

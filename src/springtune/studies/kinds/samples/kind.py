@@ -229,11 +229,8 @@ def _check(config, problems):
     most = most_scenes()
     if sample.scenes > most:
         each = f"{sample.each} rows x {len(sample.load)} loads x {len(sample.definition)} definitions"
-        problems.add(
-            ("samples", "size"),
-            f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {most}: "
-            f"give a smaller size, or fewer loads and definitions, {MORE_SCENES}",
-        )
+        what = f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {most}"
+        problems.add(("samples", "size"), f"{what}: give a smaller size, or fewer loads and definitions, {MORE_SCENES}")
 
 
 def _check_sizes(sample, problems):
@@ -259,9 +256,13 @@ def _expand(config, declared):
 
 
 def _summary(sample):
-    counts = [(sample.size, "base sample"), (sample.each, "row"), (len(sample.load), "load")]
-    counts += [(len(sample.definition), "definition")]
-    of = " x ".join(f"{count} {what}s" for count, what in counts if count > 1)
+    counts = {
+        "base sample": sample.size,
+        "row": sample.each,
+        "load": len(sample.load),
+        "definition": len(sample.definition),
+    }
+    of = " x ".join(f"{count} {what}s" for what, count in counts.items() if count > 1)
     return [["samples", sample.scenes, f"scenes, {of}, design '{sample.design}': {', '.join(sample.varied)}"]]
 
 
