@@ -231,9 +231,8 @@ def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Prob
             if name == "calibrated" and not config.definitions.calibrated:
                 problems.add(path, "'calibrated' needs to know on what; add definitions.calibrated, a beam and a load")
         paper = (scene for scene in grid.scenes if scene.definition == "paper")
-        for mesh_type, material, thickness in dict.fromkeys(
-            (scene.mesh.mesh_type, scene.material, scene.mesh.beam.thickness) for scene in paper
-        ):
+        sheets = dict.fromkeys((scene.mesh.mesh_type, scene.material, scene.mesh.beam.thickness) for scene in paper)
+        for mesh_type, material, thickness in sheets:
             number, value = stated.get((mesh_type, material.name), (0, None))
             expected = COEFFICIENT * material.young_modulus * thickness
             if value is None:

@@ -192,18 +192,17 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
     """Curves that calibrate the scenes of the definition ``calibrated``."""
     if not config.definitions.calibrated:
         return []
-    place = config.definitions.calibrated.beam, config.definitions.calibrated.load
-    there = [one for one in scenes if (one.mesh.beam.name, one.load) == place]
+    beam, load = config.definitions.calibrated.beam, config.definitions.calibrated.load
+    there = [one for one in scenes if one.mesh.beam.name == beam and one.load == load]
     calibrated = (one for one in scenes if one.definition == "calibrated")
+    cases = dict.fromkeys((one.mesh.mesh_type, one.material, one.kinematics) for one in calibrated)
     curves: list[CurveSpec] = []
-    for mesh_type, material, kinematics in dict.fromkeys(
-        (one.mesh.mesh_type, one.material, one.kinematics) for one in calibrated
-    ):
+    for mesh_type, material, kinematics in cases:
         alike = (one for one in there if one.mesh.mesh_type == mesh_type and one.material == material)
         found = [*dict.fromkeys(CurveSpec(one.mesh, material, one.load, one.force, kinematics) for one in alike)]
         curves += found
-        path, where = ("definitions", "calibrated"), f"beam '{place[0]}' in {place[1]} on {mesh_type} meshes"
-        where += f" of {material.name}"
+        path = ("definitions", "calibrated")
+        where = f"beam '{beam}' in {load} on {mesh_type} meshes of {material.name}"
         if not found:
             what = f"no grid has {where}, but scenes there are 'calibrated'"
             problems.add(path, f"{what}; add it to a grid, or calibrate on another beam or load")
@@ -223,10 +222,9 @@ def build(
 ) -> Study:
     """Build the study with the parts of all study kinds."""
     # By their places: hashing a beam and a material for each of 100,000 scenes is slow.
-    loaded = {
-        (id(one.mesh.beam), id(one.material), one.load, one.force): one for grid in grids for one in grid.scenes
-    }.values()
-    references = [Reference(one.mesh.beam, one.material, one.load, one.force) for one in loaded]
+    every = [scene for grid in grids for scene in grid.scenes]
+    loaded = {(id(one.mesh.beam), id(one.material), one.load, one.force): one for one in every}
+    references = [Reference(one.mesh.beam, one.material, one.load, one.force) for one in loaded.values()]
     ranks, names = _ranks(config), swept(config, references)
 
     def order(item: Item) -> list[Any]:
@@ -236,15 +234,13 @@ def build(
     def in_order(items: Iterable[Item]) -> tuple[Item, ...]:
         return tuple(sorted(dict.fromkeys(items), key=order))
 
-    scenes = in_order(scene for grid in grids for scene in grid.scenes)
+    scenes = in_order(every)
     curves = [curve for grid in grids for curve in grid.curves] + _calibrating(config, scenes, problems)
     meshes = in_order(scene.mesh for scene in scenes)
-    used: dict[str, set[Any]] = {name: set() for name in (*ranks, "mesh_size", *names)}
-    for labels in [mesh.labels for mesh in meshes] + [one.labels(names) for one in references]:
-        for name, label in labels.items():
-            used[name].add(label)
-    for name in {"definition", "kinematics", "stiffness_scale"} & used.keys():
-        used[name] = {getattr(scene, name) for scene in scenes}
+    found, used = [mesh.labels for mesh in meshes] + [one.labels(names) for one in references], dict[str, set[Any]]()
+    for name in (*ranks, "mesh_size", *names):
+        own = name in ("definition", "kinematics", "stiffness_scale")
+        used[name] = {getattr(one, name) for one in scenes} if own else {one[name] for one in found if name in one}
     checks.check_cells(config, used, bool(curves), problems)
     problems.stop()
     parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
@@ -270,7 +266,7 @@ def build(
         stiffness_table={(row.mesh_type, row.material): row.value for row in checks.stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
         printed=read_printed(about["printed_path"], config, problems) if config.printed else (),
-        axes=_axes(ranks, used, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
+        axes=_axes(ranks, used, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
         swept=names,
         **about,
     )
@@ -285,11 +281,8 @@ def build(
 
 
 def _axes(
-    ranks: Mapping[str, Mapping[Any, int]],
-    used: Mapping[str, set[Any]],
-    names: Iterable[str],
-    further: Sequence[Mapping[str, Collection[str | float]]],
-) -> dict[str, tuple[str | float, ...]]:
+    ranks: dict[str, dict[Any, int]], used: dict[str, set[Any]], further: Sequence[Mapping[str, Collection[Any]]]
+) -> dict[str, tuple[Any, ...]]:
     """Labels of each dimension; groups share those of the root."""
     # A study kind may have labels that no beam has, such as loads of its own.
     more = {name: [*chain.from_iterable(labels.get(name, ()) for labels in further)] for name in used}
@@ -297,7 +290,7 @@ def _axes(
     own = {name: tuple(values) for labels in further for name, values in labels.items() if name not in used}
     order = {name: dict.fromkeys([*labels, *more[name]]) for name, labels in ranks.items()}
     axes = {name: tuple(label for label in labels if label in found[name]) for name, labels in order.items()}
-    return axes | {name: tuple(sorted(found[name])) for name in ("mesh_size", *names)} | own
+    return axes | {name: tuple(sorted(labels)) for name, labels in found.items() if name not in ranks} | own
 
 
 # -- CSV files ---------------------------------------------------------------------------------------------------------
