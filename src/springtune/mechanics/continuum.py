@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from ..linalg.factors import SingularError
-from ..mesh.cells import Mesh, MeshError, rows_of, signed_areas
+from ..mesh.cells import Mesh, MeshError, rows_of, side_shares, signed_areas
 from ..mesh.sheets import connected
 from .network import Network
 
@@ -210,7 +210,7 @@ def lateral_forces(mesh: Mesh) -> np.ndarray:
     forces = np.zeros(mesh.points.shape)
     y = mesh.points[:, 1]
     for value, sign in ((y.min(), -1.0), (y.max(), 1.0)):
-        forces[:, 1] += sign * mesh.side_shares(mesh.outline_edges(1, value), 0)
+        forces[:, 1] += sign * side_shares(mesh, mesh.outline_edges(1, value), 0)
     return forces
 
 

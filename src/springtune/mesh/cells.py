@@ -86,8 +86,8 @@ class Mesh:
     >>> mesh.sum_to_edges({3: np.ones((2, 3))}).tolist()  # edges of the cells, counted
     [1.0, 2.0, 1.0, 1.0, 1.0]
     >>> right = mesh.outline_edges(0, 1.0)
-    >>> right.tolist(), mesh.side_shares(right, axis=1).tolist()
-    ([[1, 2]], [0.0, 0.5, 0.5, 0.0])
+    >>> right.tolist()
+    [[1, 2]]
     >>> mesh.inverted(mesh.points * [-1, -1]), mesh.inverted(mesh.points * [-1, 1])  # rotated, mirrored
     (False, True)
     >>> st.Mesh(2 * points, mesh.triangles).shares_cells(mesh)
@@ -228,26 +228,6 @@ class Mesh:
             np.add.at(shares, corners, signed_areas(self.points, corners)[:, None] / count)
         return shares
 
-    def side_shares(self, edges: np.ndarray, axis: int) -> np.ndarray:
-        """Return each particle's share in the extent of edges along an axis: half of each edge's.
-
-        Parameters
-        ----------
-        edges : ndarray of int, shape (n, 2)
-            Indices of the particles at the ends of each edge.
-        axis : int
-            0 for x, 1 for y.
-
-        Returns
-        -------
-        ndarray of float, shape (n_points,)
-            [m]
-        """
-        shares = np.zeros(len(self.points))
-        extent = np.abs(self.points[edges[:, 1], axis] - self.points[edges[:, 0], axis])
-        np.add.at(shares, edges, 0.5 * extent[:, None])
-        return shares
-
     def outline_edges(self, coordinate: int, value: float) -> np.ndarray:
         """Return the outline edges on a line ``x = value`` or ``y = value``.
 
@@ -297,6 +277,14 @@ def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
         numbers = "numbers" if kind is float else "whole numbers"
         raise MeshError(f"{name}: {shape}; give an array of {numbers} of shape (n, {columns})")
     return given.astype(kind, copy=False)
+
+
+def side_shares(mesh: Mesh, edges: np.ndarray, axis: int) -> np.ndarray:
+    """Return each particle's share [m] (n_points,) in the extent of edges (n, 2) along an axis: half of each edge's."""
+    shares = np.zeros(len(mesh.points))
+    extent = np.abs(mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis])
+    np.add.at(shares, edges, 0.5 * extent[:, None])
+    return shares
 
 
 def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:

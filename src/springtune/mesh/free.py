@@ -145,24 +145,23 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
 
 def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -> dict[str, float]:
     """Mesh size by the name of what is refined, ``""`` for all else [m]."""
-    (left, low), (right, high) = shape.extent
+    smaller, larger = sorted(np.ptp(shape.extent, axis=0).tolist())
     lengths: dict[str, float] = defaultdict(float)
     for one in shape.rounds:
         for side in one.sides:
             lengths[side.group] += side.length_to(1.0)
     known = {*lengths, *shape.points, *(one.inner for one in shape.rounds)} - {"", None}
     for name, value in {"": size, **refined}.items():
-        told = f"refined {name!r}" if name else "mesh size"
+        where = f"refined {name!r}" if name else "mesh size"
         if not value > 0:
-            raise MeshError(f"{told}: {value!r} is not a number above zero; give one in m")
+            raise MeshError(f"{where}: {value!r} is not a number above zero; give one in m")
         if name and name not in known:
             there = ", ".join(sorted(map(str, known))) or "none"
-            raise MeshError(f"{told}: {what} has no side, point or part of that name; known: {there}")
-        if name and value < LEAST_SIZE_SHARE * max(right - left, high - low):
-            raise MeshError(f"{told}: {value!r} is less than some millionths of {what}; give more")
+            raise MeshError(f"{where}: {what} has no side, point or part of that name; known: {there}")
+        if name and value < LEAST_SIZE_SHARE * larger:
+            raise MeshError(f"{where}: {value!r} is less than some millionths of {what}; give more")
         if value > size:
-            raise MeshError(f"{told}: {value!r} is larger than the mesh size, {size!r}; give at most that")
-    smaller = min(right - left, high - low)
+            raise MeshError(f"{where}: {value!r} is larger than the mesh size, {size!r}; give at most that")
     if size > smaller:
         raise MeshError(f"mesh size: {size!r} is larger than {what}; give at most its smaller extent, {smaller:g}")
     count = shape.area / (ROW_HEIGHT * size**2) + 0.5 * sum(lengths.values()) / size
@@ -174,12 +173,13 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
     return {"": size, **refined}
 
 
-def _divide_sides(
-    shape: Outlined, sizes: Mapping[str, float]
-) -> tuple[list[_Stretch], list[tuple[Point, Point, int]], dict[Point, float]]:
+Line = tuple[Point, Point, int]
+"""Start and end of a line of one edge [m], and its region."""
+
+
+def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[_Stretch], list[Line], dict[Point, float]]:
     """Stretches of the outlines, one for each edge; lines from points on none; and sizes at all named points."""
-    (left, low), (right, high) = shape.extent
-    small = 1e-9 * max(right - left, high - low)
+    small = 1e-9 * np.ptp(shape.extent, axis=0).max()
     inside = dict(shape.points)
     stretches = []
     fine: dict[Point, float] = {}
@@ -224,7 +224,7 @@ def _separate_chords(stretches: list[_Stretch], name: str) -> list[_Stretch]:
     raise MeshError(f"shape '{name}': arcs are too near to others to be meshed; keep them apart")
 
 
-def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, Point, int]]:
+def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[Line]:
     """Lines of one edge from points inside the body, and their regions: netgen places particles on lines only."""
     sides = [side for one in shape.rounds for side in one.sides]
     found = []
@@ -239,9 +239,8 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
         length, end = 2 * min(size, room(point)), point
         while room(end) < 0.5 * length or end == point:
             length *= 0.5
-            ways = [(length * math.cos(turn), length * math.sin(turn)) for turn in (i * math.pi / 6 for i in range(12))]
-            ends = [(point[0] + x, point[1] + y) for x, y in ways]
-            end = max(ends, key=room)
+            ways = [(math.cos(turn), math.sin(turn)) for turn in (i * math.pi / 6 for i in range(12))]
+            end = max([(point[0] + length * x, point[1] + length * y) for x, y in ways], key=room)
         around = [i for i, one in enumerate(shape.rounds) if winds_about(one.sides, point)]
         found.append((point, end, 1 + min(around, key=lambda i: shape.rounds[i].area)))
     return found
@@ -250,7 +249,7 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
 def _netgen(
     shape: Outlined,
     stretches: Sequence[_Stretch],
-    lines: Sequence[tuple[Point, Point, int]],
+    lines: Sequence[Line],
     fine: Mapping[Point, float],
     sizes: Mapping[str, float],
 ) -> tuple[Triangulation, list[list[int]], dict[int, list[float]]]:

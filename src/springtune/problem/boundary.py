@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ..mesh.cells import Mesh, no_cells, signed_areas
-from ..mesh.sheets import GroupedMesh, check_held, part_names, parts_of
+from ..mesh.sheets import GroupedMesh, check_held, part_names, parts_of, side_fault
 from ..mesh.sides import in_words
 from .loads import MIDDLE, LoadKind, Side
-from .shapes import LoadCase, Quantity
+from .shapes import LoadCase, Quantity, check_names
 
 FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
 """Places of the profile of a pressed face, over its length [1]."""
@@ -214,13 +214,13 @@ def _corner_weights(corners: np.ndarray) -> np.ndarray | None:
 
 def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
     """Refuse a load case whose groups a mesh lacks, or that leaves cells free to move."""
-    case.check_names(grouped.sides, grouped.points, grouped.unusable)
+    check_names(case, grouped.sides, grouped.points, grouped.unusable)
     where = f"load {case.name!r}"
     pressed = {one.group for one in case.pressures}
     held_and_pulled = [("support", one.group) for one in case.supports]
     held_and_pulled += [("traction", one.group) for one in case.tractions]
     for name in dict.fromkeys([*pressed, *(name for _, name in held_and_pulled), *(one.of for one in case.quantities)]):
-        if name in grouped.sides and (fault := grouped.side_fault(name, directed=name in pressed)):
+        if name in grouped.sides and (fault := side_fault(grouped, name, name in pressed)):
             raise ValueError(f"{where}: {name!r} {fault}")
     for what, name in held_and_pulled:
         if name in grouped.points and grouped.particle(name) is None:

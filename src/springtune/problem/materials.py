@@ -535,11 +535,9 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
     why = "or some strain takes no work; correct"
     if not abs(c12) < bound:
         return f"C12 is {c12:.6g} Pa, and its size must be below sqrt(C11 C22) = {bound:.6g} Pa, {why} it"
-    least = 0.0
-    if c16 or c26:
-        a, b = c16 / math.sqrt(c11), c26 / math.sqrt(c22)  # no product of two stiffnesses: they may be large
-        ratio = c12 / bound
-        least = (a * a - 2 * ratio * a * b + b * b) / ((1 - ratio) * (1 + ratio))
+    a, b = c16 / math.sqrt(c11), c26 / math.sqrt(c22)  # no product of two stiffnesses: they may be large
+    ratio = c12 / bound
+    least = (a * a - 2 * ratio * a * b + b * b) / ((1 - ratio) * (1 + ratio))
     if not c66 > least:
         others = f"with these C16 and C26 it must be above {least:.6g} Pa"
         return f"C66 is {c66:.6g} Pa, and {others}, {why} it, or the other two"

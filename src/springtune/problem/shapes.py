@@ -517,11 +517,6 @@ class LoadCase:
     ... )
     >>> pull.quantities[0].of
     'right'
-    >>> try:
-    ...     pull.check_names(["lfet", "right"], ["corner"])
-    ... except ValueError as error:
-    ...     print(error)
-    load 'pull', support: no group is named 'left'; did you mean 'lfet'? known: lfet, right, corner
     """
 
     name: str
@@ -552,46 +547,33 @@ class LoadCase:
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{what}: two quantities are named {twice[0]!r}; rename one")
 
-    def check_names(
-        self, sides: Iterable[str], points: Iterable[str], unusable: Mapping[str, str] | None = None
-    ) -> None:
-        """Refuse unknown names of groups, and names of groups of the wrong kind.
 
-        Parameters
-        ----------
-        sides, points : iterable of str
-            Names of groups of sides, and of points.
-        unusable : mapping of str to str, optional
-            Names in a mesh file that are not usable groups, with the reason.
-
-        Raises
-        ------
-        ValueError
-            With the known names.
-        """
-        sides, points, unusable = tuple(sides), tuple(points), unusable or {}
-        both, where = (*sides, *points), f"load {self.name!r}"
-        uses = [("support", one.group, both) for one in self.supports]
-        uses += [("traction", one.group, both) for one in self.tractions]
-        uses += [("pressure", one.group, sides) for one in self.pressures]
-        of = {"displacement": both, "reaction": both, "stress": points}
-        uses += [(f"quantity {one.name!r}", one.of, of[one.kind]) for one in self.quantities if one.kind in of]
-        for what, name, known in uses:
-            if name in known:
-                continue
-            if name in unusable:
-                raise ValueError(f"{where}, {what}: {name!r} {unusable[name]}")
-            if name in both:
-                wrong = "is a point, and needs sides" if name in points else "is sides, and needs a point"
-                raise ValueError(f"{where}, {what}: {name!r} {wrong}; {nearest(name, known)}")
-            there = nearest(name, known) if known else "there are none; name some"
-            raise ValueError(f"{where}, {what}: no group is named {name!r}; {there}")
-        for one in self.quantities:
-            axis = one.component[:1] or "x"
-            held = [support.group for support in self.supports if getattr(support, axis) is not None]
-            if one.kind == "reaction" and one.of not in held:
-                why = f"no support holds {one.of!r} along {one.component}; held: {', '.join(held) or 'none'}"
-                raise ValueError(f"{where}, quantity {one.name!r}: {why}")
+def check_names(
+    case: LoadCase, sides: Iterable[str], points: Iterable[str], unusable: Mapping[str, str] | None = None
+) -> None:
+    """Refuse names of groups that are unknown, of the wrong kind, or `unusable` in a mesh file for the given reason."""
+    sides, points, unusable = tuple(sides), tuple(points), unusable or {}
+    both, where = (*sides, *points), f"load {case.name!r}"
+    uses = [("support", one.group, both) for one in case.supports]
+    uses += [("traction", one.group, both) for one in case.tractions]
+    uses += [("pressure", one.group, sides) for one in case.pressures]
+    of = {"displacement": both, "reaction": both, "stress": points}
+    uses += [(f"quantity {one.name!r}", one.of, of[one.kind]) for one in case.quantities if one.kind in of]
+    for what, name, known in uses:
+        if name in known:
+            continue
+        if name in unusable:
+            raise ValueError(f"{where}, {what}: {name!r} {unusable[name]}")
+        if name in both:
+            wrong = "is a point, and needs sides" if name in points else "is sides, and needs a point"
+            raise ValueError(f"{where}, {what}: {name!r} {wrong}; {nearest(name, known)}")
+        there = nearest(name, known) if known else "there are none; name some"
+        raise ValueError(f"{where}, {what}: no group is named {name!r}; {there}")
+    for one in [one for one in case.quantities if one.kind == "reaction"]:
+        held = [support.group for support in case.supports if getattr(support, one.component) is not None]
+        if one.of not in held:
+            why = f"no support holds {one.of!r} along {one.component}; held: {', '.join(held) or 'none'}"
+            raise ValueError(f"{where}, quantity {one.name!r}: {why}")
 
 
 @dataclass(frozen=True)
@@ -684,7 +666,7 @@ class Shape:
             self._check_rounds()
             put(self, points={name: self._place_point(name, point) for name, point in points.items()})
             for load in self.loads.values():
-                load.check_names(self.groups, self.points)
+                check_names(load, self.groups, self.points)
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
         (left, low), (right, high) = self.extent

@@ -12,7 +12,7 @@ from ..mesh.cells import MeshError, signed_areas
 from ..mesh.sheets import GroupedMesh, check_held
 from ..mesh.sides import in_words
 from ..problem.materials import AnyMaterial
-from ..problem.shapes import LoadCase, Quantity, Shape
+from ..problem.shapes import LoadCase, Quantity, Shape, check_names
 from .answers import most_rotation_and_strain
 from .small_strain import ReferenceNotConvergedError
 from .triangles import (
@@ -254,7 +254,7 @@ class Problem:
             self.density[self.mesh.names.index(name)] = density
 
         groups = {group for side in self.mesh.sides.values() for group in side.groups}
-        load.check_names(sorted(groups), sorted(self.points))
+        check_names(load, sorted(groups), sorted(self.points))
 
         loads: dict[str, list[object]] = {}
         for number, traction in enumerate(load.tractions):
