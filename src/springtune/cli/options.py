@@ -37,19 +37,15 @@ def file_errors(option: str, target: Path) -> Iterator[None]:
         raise click.ClickException(f"{option}: {target}: {why}; give a file that can be written") from None
 
 
-SPRING_FILES = (
-    ".csv, .json, .vtu (ParaView), .xml or .mjcf (MuJoCo), .py (SOFA), .newton.py (Newton), or .xpbd.json (XPBD)"
-)
+SPRING_FILES = ".csv, .json, .vtu (ParaView), .xml, .mjcf (MuJoCo), .py (SOFA), .newton.py (Newton), .xpbd.json (XPBD)"
 """Endings of files of springs, for the help."""
 
 MATERIALS = {"steel": ("210 GPa", "0.3"), "aluminium": ("70 GPa", "0.33"), "rubber": ("1 MPa", "0.5")}
 """Young's modulus and Poisson's ratio of the paper's materials, and of aluminium."""
 
-STUDY_EXAMPLE = (
-    "config/shapes.yaml:cook"
-    if is_source_tree(Path())
-    else "shapes.yaml:cook, after `springtune new shapes --from shapes`"
-)
+STUDY_EXAMPLE = "config/shapes.yaml:cook"
+if not is_source_tree(Path()):
+    STUDY_EXAMPLE = "shapes.yaml:cook, after `springtune new shapes --from shapes`"
 """Example of a study's shape, for messages."""
 
 # -- options that exclude each other -----------------------------------------------------------------------------------
@@ -183,23 +179,14 @@ def read_body(
     return _read_beam_options(given, load, sized)
 
 
-def _size(given: Mapping[str, Any], needed: bool) -> float | None:
-    """Mesh size of the options [m]."""
-    if given["size"] is None and needed:
-        raise ValueError(MISSING["size"])
-    return None if given["size"] is None else positive(given["size"], "length", "size")
-
-
 def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     from ..mesh.cells import MESH_TYPES
-    from ..mesh.formats import read_beam_mesh
-    from ..scene.meshes import make_mesh
+    from ..scene.meshes import make_mesh, read_mesh
 
     material, mesh_type, size = read_material(given), given["mesh"] or "structured", None
     beam = read_beam(given["beam"], given["thickness"])
     if sized and mesh_type in MESH_TYPES:
-        size = _size(given, needed=True)
-        assert size is not None  # for type checkers
+        size = positive(given["size"], "length", "size")
         if refusal := MESH_TYPES[mesh_type].refusal(beam.length, beam.height, size, f"beam '{beam.name}'"):
             raise ValueError(f"size: '{given['size']}' {refusal}")
     elif sized and not Path(mesh_type).is_file():
@@ -209,7 +196,7 @@ def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) 
         if size is not None:
             return make_mesh(beam, mesh_type, size)
         unit = given["unit"] if given["unit"][:1].isdigit() else f"1 {given['unit']}"
-        return read_beam_mesh(mesh_type, beam.length, beam.height, positive(unit, "length", "unit"))
+        return read_mesh(mesh_type, beam, unit)
 
     return BodyOptions(beam, material, load, mesh_type, size, make)
 
@@ -234,7 +221,10 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
             why = f"is for one material, and of those in the study {have}"
             raise ValueError(f"density: '{density}' {why}; give theirs there")
         materials |= {name: replace(one, density=density) for name, one in materials.items() if one.density is None}
-    size, files = _size(given, needed=sized and not shape.file), shapes.files[shape.name]
+    if given["size"] is None and sized and not shape.file:
+        raise ValueError(MISSING["size"])
+    size = None if given["size"] is None else positive(given["size"], "length", "size")
+    files = shapes.files[shape.name]
     if shape.file and (size is not None or sized and len(files) > 1):
         chosen = [file for other, file in files.items() if size is not None and math.isclose(size, other)]
         if not chosen:
@@ -248,8 +238,7 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
 
 def _shape_mesh(shape: "Shape", refined: Mapping[str, float], _: str, size: float | None) -> "GroupedMesh":
     """Make the mesh of a shape, refined as in its study."""
-    from ..mesh.formats import read_shape  # here, since studies are read without scipy
-    from ..mesh.free import mesh_shape
+    from ..scene.meshes import mesh_shape, read_shape  # here, since studies are read without scipy
 
     if size is None:
         return read_shape(shape.file, shape.unit)

@@ -100,6 +100,7 @@ def predict(
     With --engine, find the factor on the stiffness that an engine needs at a setting, the errors under other loads, and
     the settings that converge.
     """
+    from ..prediction.choices import USUAL_LOADS
     from .recommendation import written_text
 
     names = None if load is None else [name.strip() for name in load.split(",") if name.strip()]
@@ -108,25 +109,17 @@ def predict(
         text, make = _answer_for_engine(sheet, engine, names or [], springs_alone)
     else:
         body = options.read_body(sheet, load, sized=error is None)
+        loads = USUAL_LOADS if names is None else names
+        under: dict[str, Any] = {"loads": loads} if body.is_beam else {"load": body.load}
         if error is None:
-            text, make = _answer_for_mesh(body, _load_arguments(body, names), springs_alone)
+            text, make = _answer_for_mesh(body, under, springs_alone)
         else:
-            text, make = _answer_for_error(body, _load_arguments(body, names), springs_alone, error, sheet["mesh"])
+            text, make = _answer_for_error(body, under, springs_alone, error, sheet["mesh"])
     click.echo(text)
     if target is not None:
         net = make()
         with options.file_errors("--write", target):
             click.echo(f"\n{written_text(net, net.write(target))}")
-
-
-def _load_arguments(body: options.BodyOptions, names: list[str] | None) -> dict[str, Any]:
-    """Loads that count, as arguments of the library: loads of a beam, or the load case of a shape."""
-    from ..prediction.choices import USUAL_LOADS, check_beam, check_loads
-
-    if not body.is_beam:
-        return {"load": body.load}
-    check_beam(body.body)
-    return {"loads": check_loads(USUAL_LOADS if names is None else names)}
 
 
 def _shape_problem(body: options.BodyOptions) -> "ShapeProblem":
@@ -146,13 +139,13 @@ def _answer_for_mesh(body: options.BodyOptions, under: dict[str, Any], springs_a
     from ..prediction.choices import SOLVED_PARTICLES, predict, references, shape_references
     from .recommendation import prediction_text, recommended
 
+    known: Any = (
+        references(body.body, body.material, **under) if body.is_beam else shape_references(_shape_problem(body))
+    )
     mesh = body.mesh if body.is_beam else body.mesh.mesh
     if len(mesh.points) > SOLVED_PARTICLES:
         why = f"has {len(mesh.points)} particles, more than the {SOLVED_PARTICLES} that are solved here"
         raise click.ClickException(f"'{body.mesh_name}' {why}; give a coarser mesh, or make it a mesh of a study")
-    known: Any = (
-        references(body.body, body.material, **under) if body.is_beam else shape_references(_shape_problem(body))
-    )
     found = predict(body.body, body.mesh, body.material, known, **under)
     counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
     found = [choice for choice in found if not (springs_alone and choice.energies)]

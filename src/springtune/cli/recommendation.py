@@ -142,20 +142,16 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
     parts = {} if springs_alone else {"with any definition": (search.best, search.by_type)}
     parts["with springs alone"] = search.best_springs, search.springs_by_type
     lines = [f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {named}", ""]
-    lines += [
-        f"{what.replace('with any definition', 'recommended')}: {answer_text(one)}" for what, (one, _) in parts.items()
-    ]
+    for what, (one, _) in parts.items():
+        lines.append(f"{what.replace('with any definition', 'recommended')}: {answer_text(one)}")
     notes: dict[str, None] = {}
     for what, (_, found) in parts.items():
         chosen = sorted((one for one in found.values() if one), key=lambda one: one.particles)
         if chosen:
             table = TabledList(chosen).table()
             lines += ["", f"{what}:", aligned(table, left=2, right=range(3, len(table[0])))]
-        notes |= {
-            f"{name}, {what}: {_nearest(search, name, what == 'with springs alone')}": None
-            for name, one in found.items()
-            if one is None
-        }
+        for name in [name for name, one in found.items() if one is None]:
+            notes[f"{name}, {what}: {_nearest(search, name, what == 'with springs alone')}"] = None
     counts, names = [one.particles for one in search.tried], tried_names(search.tried, springs_alone)
     lines += [
         "",
@@ -177,20 +173,14 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     from ..prediction.search import tried_names
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
-    near = [
-        (round(one.worst(name), 9), one.particles, name, one.size)
-        for one in tried
-        for name in tried_names(tried, springs_alone)
-        if name in one.errors
-    ]
+    on = [(one, name) for one in tried for name in tried_names(tried, springs_alone) if name in one.errors]
+    near = [(round(one.worst(name), 9), one.particles, name, one.size) for one, name in on]
     worst, particles, name, size = min(near, default=(math.inf, 0, "", 0.0))
     if worst == math.inf:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
     further = "; finer ones do not confirm it" if worst <= search.error else ""
-    return (
-        f"none up to {max(count for _, count, *_ in near):,} particles; nearest is {name} at {mesh_size_text(size)} "
-        f"({particles:,} particles), {100 * worst:.3g} % off at worst{further}"
-    )
+    nearest = f"{name} at {mesh_size_text(size)} ({particles:,} particles), {100 * worst:.3g} % off at worst"
+    return f"none up to {max(count for _, count, *_ in near):,} particles; nearest is {nearest}{further}"
 
 
 def fit_text(fit: "EngineFit", mesh_name: str, tried: Sequence[str] = ()) -> str:

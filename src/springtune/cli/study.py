@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import click
 
 from ..problem.quantities import nearest
-from ..problem.shapes import AssumptionWarning
 from ..registry import NAME, NAME_RULE, how_to_install
 from ..safe_io.files import write_bytes, write_text
 from ..safe_io.texts import aligned
@@ -126,15 +125,9 @@ def scenes(config: Path, results: Path) -> None:
     lines.
     """
     from ..studies.config.kind import kinds
-    from ..studies.config.messages import StudyError
-    from ..studies.kinds import load_study  # here, so that --help does not wait for it
     from ..studies.kinds.bodies.kind import summary
 
-    try:
-        study = load_study(config)
-    except StudyError as error:
-        click.echo(str(error), err=True)
-        raise SystemExit(1) from None
+    study = _load(config)
     parts = [(kind, study.parts[kind.name]) for kind in kinds()]
     click.echo(summary(study, [row for kind, part in parts if part for row in kind.summary(part)]))
     click.echo(f"\n{_stored_text(study, results / 'results' / study.name)}")
@@ -195,8 +188,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     Snakemake's. Exit codes: 0 all is made, also if scenes could not be solved; 1 the study is wrong or a job failed; 2
     wrong options.
     """
-    from ..studies.config.messages import StudyError
-    from ..studies.kinds import load_study  # here, so that --help does not wait for it
+    from ..problem.shapes import AssumptionWarning  # here, so that --help does not wait for it
     from ..studies.runs.plan import PAPER_STUDIES
 
     gc.disable()  # scenes and their tasks stay to the end: collecting garbage among them takes a sixth of the time
@@ -213,13 +205,9 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
         raise click.UsageError(f"{why}; {how_to_install('slurm')}")
     shown = Path(arguments[0]) if named else config_file(USUAL_STUDY)
     path = shown.absolute()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
-            study = load_study(shown)
-    except StudyError as error:
-        click.echo(str(error) + _suggestion(shown), err=True)
-        raise SystemExit(1) from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
+        study = _load(shown)
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
     if results and folder != Path.cwd():
         click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
@@ -234,9 +222,9 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
         raise click.ClickException(f"--results {folder}: {why}") from None
     set_cache()
     if _computes(options) or _is_dry_run(options):
-        study = study if path == shown else load_study(path)  # its files are seen from here
+        study = study if path == shown else _load(path)  # its files are seen from here
         others = [name for name in PAPER_STUDIES if name != study.name] if "paper" in options else []
-        studies = [study, *(load_study(config_file(f"{name}.yaml", path.parent)) for name in others)]
+        studies = [study, *(_load(config_file(f"{name}.yaml", path.parent)) for name in others)]
     if _is_dry_run(options):
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
         outdated = _outdated(studies, "a run makes it again")
@@ -343,6 +331,18 @@ def _wants_slurm(options: list[str]) -> bool:
     named = [two for one, two in zip(options, options[1:]) if one == "--workflow-profile"]
     named += [one.partition("=")[2] for one in options if one.startswith("--workflow-profile=")]
     return any(Path(one).name == "slurm" for one in named)
+
+
+def _load(path: Path) -> "Study":
+    """Study of a file; an error is printed and ends the command."""
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study
+
+    try:
+        return load_study(path)
+    except StudyError as error:
+        click.echo(str(error) + _suggestion(path), err=True)
+        raise SystemExit(1) from None
 
 
 def _suggestion(path: Path) -> str:

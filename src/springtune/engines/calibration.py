@@ -369,15 +369,14 @@ def fit_engine(
         factor, tuned = (np.nan, untuned) if why else (factor, tuned)
     found = factor == factor
     why = why or ("" if _is_at_rest(tuned) else tuned.message)
-    if abs(tuned.drift) > MOST_DRIFT:
-        why = "; ".join(filter(None, (why, tuned.drifts)))
+    notes = why, tuned.drifts if abs(tuned.drift) > MOST_DRIFT else "", scene.objection
     numbers = chosen.numbers(net_of(scene, factor), setting) if found else {}
     typed = {name: value for name, value in numbers.items() if name in chosen.parameters}
     bands = TabledList(_band(runs, name, tuned) for name in names if found)
     raised = ("substeps", "iterations") if chosen.iterates else ("substeps",)
     settings = TabledList(_needed(runs, name, setting) for name in raised if needed)
-    why = "; ".join(filter(None, (why, scene.objection)))
-    return EngineFit(scene, factor, tuned, untuned, typed, bands, settings, why, spread)
+    message = "; ".join(filter(None, notes))
+    return EngineFit(scene, factor, tuned, untuned, typed, bands, settings, message, spread)
 
 
 def _typed_rows(engine: Engine, typed: Mapping[str, Any], mesh: Mesh) -> Iterator[tuple[str, str, str, str]]:

@@ -94,7 +94,7 @@ class EngineResult(Tabled, Ended):
         ``"rest"``; else, and why: ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the
         last frame; ``"inverted"``: it rests with cells turned inside out; or ``"diverged"``.
     frames, frame_seconds : int, float
-        Time that a frame took, without the first one, which may compile [s]; NaN of a single frame.
+        Time that a frame took, without the first ones, which may compile [s]; NaN of a single frame.
     swing : float
         Largest amplitude about the mean, where it swings [m].
     scene, engine, setting, factor, damping
@@ -357,20 +357,16 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
     """Advance a session until it rests: the way left, extrapolated from the last changes, is below `tolerance`."""
     seen: list[np.ndarray] = []
-    seconds: list[float] = []  # a frame, without the first one, which may compile
+    seconds: list[float] = []  # a frame
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
         looks, size_of_window = [], min(window, most - done)
         each = ceil(size_of_window / LOOKS_PER_WINDOW)
         for begun in range(0, size_of_window, each):
             count = min(each, size_of_window - begun)
-            timed = count if done else count - 1
-            if not done:
-                session.advance(1)
-            if timed:
-                begin = time.perf_counter()
-                session.advance(timed)
-                seconds.append((time.perf_counter() - begin) / timed)
+            begin = time.perf_counter()
+            session.advance(count)
+            seconds.append((time.perf_counter() - begin) / count)
             done += count
             now = session.displacements()
             size = float(np.abs(now).max())
@@ -419,8 +415,8 @@ def _oscillates(seen: list[np.ndarray]) -> bool:
 
 
 def _frame_seconds(seconds: list[float]) -> float:
-    """Median seconds of a frame; NaN without a timed one."""
-    return float(np.median(seconds)) if seconds else np.nan
+    """Median seconds of a frame, without the first frames, which may compile; NaN without others."""
+    return float(np.median(seconds[1:])) if seconds[1:] else np.nan
 
 
 def frame_text(seconds: float) -> str:

@@ -372,13 +372,6 @@ def errors_under(problem: BoundaryProblem, springs: Springs, known: References) 
     return dict(quantity_errors({name: values[name] for name in labels}, wanted))
 
 
-def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], also: Collection[str] = ()) -> list[str]:
-    """Best definitions of springs alone and of all, and those of `also` by (energies, worst error) of each."""
-    order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), as_sure_as(known))
-    best = order[:MOST_CHOICES] + [name for name in order if not found[name][0]][:MOST_CHOICES]
-    return [name for name in order if name in best or name in also]
-
-
 class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once."""
 
@@ -450,8 +443,10 @@ class Trial:
     def choices(self, without: Collection[str] = ()) -> TabledList[Choice]:
         """Best choices of all but the definitions `without`, see `in_order`."""
         names = [name for name in self.names if name not in without]
-        measured = {name: one for name in names if (one := self.measured(name))}
-        found = [self.choice(name) for name in best_of(measured, self.known, self._also)]
+        measured, equal = {name: one for name in names if (one := self.measured(name))}, as_sure_as(self.known)
+        order = in_order(measured, lambda name: measured[name][1], lambda name: (measured[name][0], name), equal)
+        best = order[:MOST_CHOICES] + [name for name in order if not measured[name][0]][:MOST_CHOICES]
+        found = [self.choice(name) for name in order if name in best or name in self._also]
         # The patch test is for the best ones alone, and may find one of them unstable.
         failed = {one.definition for one in found if one.failures and {*one.failures} <= {"patch test"}} - {*self._also}
         if failed and len(failed) < len(names):

@@ -1,8 +1,4 @@
-"""Search for the coarsest mesh of each type that keeps an error, by solving.
-
-The error of one load may pass through zero by chance. So a mesh counts if the error of all finer meshes tried, up to
-twice as fine, is kept, with a margin: the last change may happen once more.
-"""
+"""Search for the coarsest mesh of each type that keeps an error, with all finer ones: errors may pass through zero."""
 
 import logging
 import math
@@ -382,8 +378,7 @@ class _Search:
         self, family: _Family, known: References, estimates: dict[str, float], error: float, most: int
     ) -> None:
         self.family, self.known, self._estimates, self._error = family, known, estimates, error
-        rungs = map(_cells, count())
-        self._rungs = [*takewhile(lambda cells: family.particles(self._size(cells)) <= most, rungs)]
+        self._rungs = [*takewhile(lambda cells: family.particles(self._size(cells)) <= most, map(_cells, count()))]
         self._finest = _cells(len(self._rungs))
         self._meshes: dict[bytes, SolvedMesh] = {}  # by their points
         self._keys: dict[float, bytes] = {}  # by cells across

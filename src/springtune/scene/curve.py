@@ -179,15 +179,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     faces = np.concatenate([scene.mesh.outline_edges(1, value) for value in (0.0, scene.mesh.points[:, 1].max())])
     edge = float(np.median(np.abs(np.diff(scene.mesh.points[faces, 0]))))
     best = meeting(path, force, stiffness, path.values, path.stable, reference, objection)
-    return Curve(
-        stiffness,
-        path.values,
-        deformation_error(path.values, reference),
-        path.stable,
-        ending(path, force, path.stable),
-        best.stiffness,
-        best.status,
-        best.message,
-        predicted_stiffness(scene.material, beam, edge, scene.load),
-        f"{beam.label}, {scene.load} of {abs(force):g} N",
-    )
+    predicted = predicted_stiffness(scene.material, beam, edge, scene.load)
+    off, why = deformation_error(path.values, reference), ending(path, force, path.stable)
+    title, found = f"{beam.label}, {scene.load} of {abs(force):g} N", (best.stiffness, best.status, best.message)
+    return Curve(stiffness, path.values, off, path.stable, why, *found, predicted, title)

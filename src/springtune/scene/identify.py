@@ -213,16 +213,9 @@ class Model:
         def table(steps: np.ndarray) -> np.ndarray:
             return np.concatenate(tables(steps.tobytes(), noise.tobytes()))
 
-        steps = np.zeros(len(names))
+        steps, close = np.zeros(len(names)), {"xtol": 1e-10, "ftol": 1e-10}
         for _ in range(20):  # until the noise that is estimated settles
-            steps = least_squares(
-                lambda steps: table(steps)[:, 0],
-                steps,
-                lambda steps: table(steps)[:, 1:],
-                bounds.T,
-                xtol=1e-10,
-                ftol=1e-10,
-            ).x
+            steps = least_squares(lambda s: table(s)[:, 0], steps, lambda s: table(s)[:, 1:], bounds.T, **close).x
             sums = squares(tables(steps.tobytes(), noise.tobytes()), np.ones(len(noise)))
             before, noise = noise, np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
             if np.allclose(noise, before, rtol=1e-3, atol=0):

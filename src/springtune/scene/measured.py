@@ -35,10 +35,7 @@ MOST_DISTANCE_FROM_BODY = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Numbers of one kind from one file: `values` (n,) are `factors` times what `rows` read of the displacements.
-
-    What the columns of `shifts`, such as a rigid motion, explain of them tells nothing of the material.
-    """
+    """Numbers of a file: `values` (n,) are `factors` times what `rows` read; what `shifts` explain tells nothing."""
 
     label: str
     values: np.ndarray

@@ -85,10 +85,7 @@ def naming_errors(definition: Definition) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """Supports and forces [N] of a load of factor 1 on a mesh; arrays have shape (n_points, 2).
-
-    `dead` are the forces of `pattern` that keep their direction; None if they are all of one sort.
-    """
+    """Supports and forces [N] of a load of factor 1, (n_points, 2); `dead` keep their direction, if others do not."""
 
     key: tuple[object, ...]
     held: np.ndarray
@@ -126,11 +123,12 @@ def solve_and_judge(
     return Solution(problem, found, status, message, pivots, value)
 
 
-class MeshCache:
-    """Cache of a meshed sheet of a thickness [m], on which scenes are solved.
+KnownNetwork = tuple[Network, dict[tuple[object, ...], StaticProblem]]
+"""Network, and its problems so far."""
 
-    Networks that differ in their reference stiffness alone are assembled and factorized once.
-    """
+
+class MeshCache:
+    """Cache of a meshed sheet of a thickness [m]; networks that differ in reference stiffness alone are one."""
 
     def __init__(
         self, mesh: Mesh, thickness: float, networks: int = NETWORKS_KEPT, like: "MeshCache | None" = None
@@ -143,7 +141,7 @@ class MeshCache:
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
         self._typical: tuple[np.ndarray, dict[str, float]] | None = None
         self._patterns: dict[bytes, Network] = dict(like._patterns) if like and mesh.shares_cells(like.mesh) else {}
-        self._networks: dict[bytes, tuple[Network, dict[tuple[object, ...], StaticProblem]]] = {}
+        self._networks: dict[bytes, KnownNetwork] = {}
 
     def derive(
         self,
@@ -199,9 +197,7 @@ class MeshCache:
         """Network of springs that is held in some `directions`, shape (n_points, 2)."""
         return self._known(directions, springs)[0]
 
-    def _known(
-        self, directions: np.ndarray, springs: Springs
-    ) -> tuple[Network, dict[tuple[object, ...], StaticProblem]]:
+    def _known(self, directions: np.ndarray, springs: Springs) -> KnownNetwork:
         """Network, and its problems so far."""
         parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
         name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
@@ -241,9 +237,7 @@ class MeshCache:
     ) -> Solution:
         """Equilibrium of springs under a force with its sign [N], judged."""
         problem = self.problem(kind, springs, follower)
-        return solve_and_judge(
-            problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved)
-        )
+        return solve_and_judge(problem, force / springs.reference, kinematics, partial(self.displacement, kind))
 
     def displacement(self, kind: LoadKind, displacements: np.ndarray) -> float:
         """Displacement of a load [m] from those of the particles [m], shape (n_points, 2)."""
