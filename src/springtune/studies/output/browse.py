@@ -197,7 +197,6 @@ def _labels(name: str, own: StoredVariables, root: StoredVariables) -> dict[str,
 
 
 def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
-    """Unit and name of a variable."""
     return {name: str(stored.attrs[name]) for name in ("units", "long_name") if name in stored.attrs}
 
 

@@ -9,7 +9,6 @@ from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from springtune.problem.quantities import nearest
@@ -262,17 +261,16 @@ def _compare_variable(
         excess[differ] = [_excess_of_texts(str(x), str(y), tolerance.relative) for x, y in zip(a[differ], b[differ])]
     elif differ.any():
         excess[differ] = _excess_of_numbers(a, b, both, points, units, tolerance)[differ]
-    length = math.prod(one.shape[axis] for axis in points)
-    beyond = np.flatnonzero(excess > 1.0)
-    found = pd.DataFrame({"place": beyond, "cell": beyond // length, "excess": excess.ravel()[beyond]})
-    worst = found.sort_values("excess", ascending=False, kind="stable").drop_duplicates("cell")
-    value = str if texts else float
-    rows = []
-    for place, over in worst[["place", "excess"]][:most].itertuples(index=False):
+    length, value, rows = math.prod(one.shape[axis] for axis in points), str if texts else float, []
+    cells = excess.reshape(-1, length)
+    worst = cells.max(axis=1)
+    changed = np.argsort(-worst, kind="stable")[: np.count_nonzero(worst > 1.0)]
+    for place in (changed * length + cells[changed].argmax(axis=1))[:most]:
         labels = _labels(one, np.unravel_index(place, one.shape))
+        over = float(excess.flat[place])
         rows.append(Change(group, name, labels, value(a.flat[place]), value(b.flat[place]), units, over))
     compared = (both | unmatched).reshape(-1, length).any(axis=1).sum()
-    return VariableChanges(name, int(compared), len(worst), rows)
+    return VariableChanges(name, int(compared), len(changed), rows)
 
 
 def _cell_dimensions(pair: Pair, roots: Pair) -> set[str]:

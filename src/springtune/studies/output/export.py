@@ -45,38 +45,34 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
         raise RequestError(f"--group {group}: the group has no variables; give one of {others}")
     rows = math.prod(data.sizes.values())
     if rows * len(data.variables) > MOST_NUMBERS:
-        raise ValueError(
-            f"group '{group}': {rows} rows of {len(data.variables)} columns, and at most {MOST_NUMBERS} values are "
-            "written; select in Python: springtune.open(path)['group'].sel(...).to_dataframe()"
-        )
-    asked = data.status != Status.NOT_REQUESTED if "status" in data else None
+        why = f"{rows} rows of {len(data.variables)} columns, and at most {MOST_NUMBERS} values are written"
+        remedy = "select in Python: springtune.open(path)['group'].sel(...).to_dataframe()"
+        raise ValueError(f"group '{group}': {why}; {remedy}")
+    asked = data.status != Status.NOT_REQUESTED if "status" in data else xr.DataArray(True)
     for variable in data.data_vars:
         if is_flagged(data[variable]):
             data[variable] = data[variable].dims, as_words(data[variable])
     units = {str(name): one.attrs.get("units", "1") for name, one in data.variables.items()}
     frame = data.to_dataframe().reset_index() if data.sizes else pd.DataFrame([{n: data[n].item() for n in data}])
-    if asked is not None and asked.dims:
+    if asked.dims:
         frame = frame[asked.broadcast_like(xr.Dataset(coords=data.coords)).transpose(*data.sizes).values.ravel()]
     return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items() if unit not in ("", "1")})
 
 
 def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False) -> str:
     """Write a group as CSV or Parquet, by the ending of a path; return what was written in words."""
-    if path.suffix.lower() not in TABLE_ENDINGS:
-        raise RequestError(
-            f"{path}: '{path.suffix}' is no format to export to; give a file in {' or '.join(TABLE_ENDINGS)}"
-        )
+    ending = path.suffix.lower()
+    if ending not in TABLE_ENDINGS:
+        remedy = f"give a file in {' or '.join(TABLE_ENDINGS)}"
+        raise RequestError(f"{path}: '{path.suffix}' is no format to export to; {remedy}")
     check_folder(path)
     if path.exists() and not force:
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
-    if path.suffix.lower() == ".parquet" and not find_spec("pyarrow"):
+    if ending == ".parquet" and not find_spec("pyarrow"):
         raise ValueError(f"{path}: Parquet needs pyarrow, which is not installed; {how_to_install('export')}")
     frame = table(tree, group)
     with replacing(path) as unfinished:
-        if path.suffix.lower() == ".csv":
-            frame.to_csv(unfinished, index=False)
-        else:
-            frame.to_parquet(unfinished, index=False)
+        (frame.to_csv if ending == ".csv" else frame.to_parquet)(unfinished, index=False)
     return f"{path}: {len(frame)} rows, {len(frame.columns)} columns of group '{group}'"
 
 

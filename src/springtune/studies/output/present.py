@@ -87,8 +87,7 @@ def write_page(tree: xr.DataTree, folder: str | Path) -> list[str]:
     known = (name for name in modules("tables", "figures") if name.split(".")[2] in ("bodies", *tree.children))
     found = (getattr(import_name(name), "tables", None) for name in known)
     tables = [table for of_kind in found if of_kind for table in of_kind(tree)]
-    written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
-    written["index.html"] = html(tables, tree)
+    written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables} | {"index.html": html(tables, tree)}
     for name, text in written.items():
         write_text(Path(folder) / name, text)
     return list(written)
@@ -105,9 +104,8 @@ def html(tables: Iterable[Mapping[str, Any]], tree: xr.DataTree) -> str:
     for table in tables:
         cells, count = table["shown"] if "shown" in table else texts(table["rows"]), len(table["rows"])
         beyond = f"The first {MOST_ROWS} of {count} rows; the file has all of them: " if count > MOST_ROWS else ""
-        shown.append(
-            dict(table) | {"html": cells.to_html(index=False, border=0) if len(cells) else "", "beyond": beyond}
-        )
+        text = cells.to_html(index=False, border=0) if len(cells) else ""
+        shown.append(dict(table) | {"html": text, "beyond": beyond})
     return environment.get_template("page.html").render(
         tables=shown,
         scenes=scenes,
@@ -138,9 +136,8 @@ def _column_texts(name: str, values: list[Any]) -> list[str]:
     short = [f"{value:g}" for value in values]
     if max(map(len, short)) <= 4 and "nan" not in short:  # as a study says it: mesh sizes, friction
         return short
-    error = "error" in name
-    places = error_decimals(values) if error else decimals(values)
-    return [number(value, places, sign=error) for value in values]
+    places = error_decimals(values) if "error" in name else decimals(values)
+    return [number(value, places, sign="error" in name) for value in values]
 
 
 def error_decimals(values: Iterable[float]) -> int:

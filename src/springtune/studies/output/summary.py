@@ -42,7 +42,6 @@ def beside(study: "Study", jobs: Jobs, since: float) -> str:
 
 
 def _last_line(log: Path) -> str:
-    """Last line of a job's log."""
     said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
     if said:
         return said[-1].strip()
@@ -73,7 +72,6 @@ def reminder(folder: Path) -> str:
 
 
 def _modified(path: Path) -> float:
-    """Modification time; minus infinity if missing."""
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 

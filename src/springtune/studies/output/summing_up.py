@@ -81,7 +81,6 @@ def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, int, str, Mappin
 
 
 def _cells(data: xr.Dataset, dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
-    """Labels and messages of cells."""
     return [(place_text(data, dims, place), str(messages[tuple(place)])) for place in np.argwhere(there)]
 
 
@@ -228,7 +227,6 @@ def _groups(tree: xr.DataTree) -> list[str]:
 
 
 def _provenance(tree: xr.DataTree) -> list[str]:
-    """Versions, commit and hashes."""
     lines = ["made with", f"  springtune {tree.attrs.get('springtune_version', 'unknown')}"]
     lines += [f"  commit {tree.attrs['git_commit']}"] if tree.attrs.get("git_commit") else []
     software = from_json(tree.attrs.get("software")).items()

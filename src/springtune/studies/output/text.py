@@ -31,10 +31,8 @@ def bytes_text(number: float) -> str:
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
     """Label of a dimension for readers.
 
-    >>> label_text("mesh_size", 0.005, "m"), label_text("load", "shear"), label_text("friction", 0.2)
-    ('5 mm', 'shear', 'friction 0.2')
-    >>> label_text("mesh_size", 0.0, "m"), label_text("force", 12345.6, "N")
-    ('size of the file', '12.3456 kN')
+    >>> label_text("mesh_size", 0.0, "m"), label_text("friction", 0.2), label_text("force", 12345.6, "N")
+    ('size of the file', 'friction 0.2', '12.3456 kN')
     """
     if isinstance(label, str) or not isinstance(label, SupportsFloat):
         return str(label)
