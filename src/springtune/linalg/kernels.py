@@ -110,10 +110,7 @@ def advance(
     right: Field,
     squares: Field,
 ) -> None:
-    """Step along `u`: add it to the solution, and take its forces off the residual.
-
-    `right` is set to the residual times a scale, `squares` to each chunk's squared norm of the residual.
-    """
+    """Step along `u`, and set `right` to the new residual times a scale, `squares` to its squared norm by chunk."""
     for chunk in range(first, last):
         total = 0.0
         for i in range(matrix.starts[chunk], matrix.starts[chunk + 1]):

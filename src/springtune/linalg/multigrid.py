@@ -26,8 +26,7 @@ MAX_CG_ITERATIONS = 300
 CERTAIN = 1e-7
 """Residual over a random right-hand side below which every direction has been met.
 
-Each of n unknowns has a normally distributed share of deviation ``n**-0.5``, below this in one case of 10 000 for two
-million unknowns.
+Of two million unknowns, with shares of deviation ``n**-0.5``, one is below this in one case of 10 000.
 """
 
 COARSENING = 3.0

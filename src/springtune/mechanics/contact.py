@@ -167,10 +167,7 @@ class Obstacle:
 
 
 class _Sides:
-    """Edges and corners of an outline in its current position, with normals out of the body.
-
-    `turn` is the sine of the turn at the end of an edge, positive at convex corners; the body is bent around `wraps`.
-    """
+    """Outline now, normals outwards; `turn`: sine of the turn at an edge's end, convex > 0; `wraps`: where concave."""
 
     def __init__(self, body: Body | Obstacle) -> None:
         first, last = body.outline.T

@@ -1,6 +1,5 @@
 """Equilibrium paths by arc length: beyond a load step, through limit points, and to buckling loads."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -163,8 +162,7 @@ def _limit_load(way: list[float], loads: list[float]) -> float:
     return float(loads[-2] - slope**2 / (4 * square)) if square * loads[-2] < 0 else loads[-2]
 
 
-@dataclass(frozen=True)
-class Path:
+class Path(NamedTuple):
     """Points of an equilibrium path, in order from rest; `loads` (n,) are over the reference stiffness [m]."""
 
     loads: np.ndarray

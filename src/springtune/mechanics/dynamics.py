@@ -74,10 +74,7 @@ class Run(Tabled):
 
 
 class Motion(Moving):
-    """Network with masses, dampers and a load, over the `reference` stiffness [N/m]; `mass_damping` is alpha [1/s].
-
-    ``beta * network.stiffness`` as dampers is Rayleigh damping by stiffness.
-    """
+    """`Moving` network with its frequencies, energy and runs; dampers ``beta * network.stiffness`` are Rayleigh's."""
 
     # -- before a run -----------------------------------------------------------------------------------------------
 
@@ -224,8 +221,7 @@ class Motion(Moving):
         with closing(stepper):
             while True:
                 u, v = stepper.state(exact=bool(sample) or rest is not None or done >= steps)
-                end = self._bad_end(stepper.failed, u, v, name, step, done)
-                if end is not None:
+                if end := self._bad_end(stepper.failed, u, v, name, step, done):
                     u, v = stepper.state()
                     break
                 if sample:

@@ -33,10 +33,7 @@ NO_CHOLESKY_FROM_UNKNOWNS = 600_000
 """Unknowns above which multigrid also replaces Cholesky: faster there, with half the memory."""
 
 MOST_CHOLESKY_UNKNOWNS = 2_500_000
-"""Unknowns up to which Cholesky (2 kB an unknown) replaces multigrid that does not converge.
-
-Up to `NO_CHOLESKY_FROM_UNKNOWNS` SuperLU does, without CHOLMOD or with an unsymmetric matrix.
-"""
+"""Unknowns up to which Cholesky (2 kB an unknown) replaces multigrid that does not converge; SuperLU: to fewer."""
 
 PINS_FROM_UNKNOWNS = 5_000
 """Unknowns above which an indefinite matrix gets a `PinnedFactor`; SuperLU is as fast on smaller ones."""
@@ -108,10 +105,7 @@ class Network:
     ) -> None:
         if solver not in (None, *SOLVERS):  # a wrong name would be SuperLU's
             raise ValueError(f"unknown solver '{solver}'; known: {', '.join(SOLVERS)}")
-        self.solver = solver
-        self.mesh = mesh
-        self.held = held
-        self.stiffness = stiffness
+        self.mesh, self.held, self.stiffness, self.solver = mesh, held, stiffness, solver
         self.energies = tuple(energies)
         self.has_springs = bool(np.any(stiffness)) or not self.energies
         self._indefinite = False  # the last matrix that was factorized, a large one

@@ -91,9 +91,7 @@ class LoadedNetwork:
         dead: np.ndarray | None = None,
         given: np.ndarray | None = None,
     ) -> None:
-        self.network = network
-        self.follower = follower
-        self.given = given
+        self.network, self.follower, self.given = network, follower, given
         self.load = network.reduce(pattern)
         self.load_norm = float(np.linalg.norm(self.load))
         self._dead = None if dead is None or follower is None else network.reduce(dead)
@@ -133,10 +131,8 @@ class LoadedNetwork:
     def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
         """Return the eigenvalues nearest to zero of the tangent over the masses, under a follower pressure.
 
-        This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real axis
-        (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform sheet;
-        damping, left out, can lower the critical load. At most `MOST_MODES` squared frequencies over stiffness and mass
-        of the whole sheet.
+        One may pass zero (buckling), or two may merge and leave the real axis (flutter; Beck's column: M. Beck, Z.
+        angew. Math. Phys. 3:225, 1952). Masses are those of a uniform sheet; damping, left out, can lower the load.
         """
         network = self.network
         mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area

@@ -25,10 +25,7 @@ PIN_COUNTS = (8, 32)
 
 
 class Pattern:
-    """Sparsity of the matrices of all networks with one mesh and one set of held directions: springs define it.
-
-    `number` (n_points, 2) is the unknown of each direction, -1 where held; rows are ascending.
-    """
+    """Sparsity of one mesh's matrices, rows ascending; `number` (n_points, 2) is a direction's unknown, -1 if held."""
 
     def __init__(self, mesh: Mesh, held: np.ndarray) -> None:
         self.mesh, self.springs = mesh, mesh.edges

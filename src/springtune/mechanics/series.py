@@ -1,5 +1,6 @@
 """Sensitivity curves: the displacement under many loads ``s = F / k`` from one equilibrium path, by power series."""
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -111,7 +112,8 @@ class StablePath:
             values, errors = series.measure(self.weights, loads)
         good, count, served, before = errors <= CURVE_TOLERANCE, 0, errors <= CURVE_TOLERANCE, None
         for _ in range(MAX_SERIES):
-            number, point = self._served_loads(series, loads[count:], values[count:], served)
+            end = count + int(np.argmin([*served, False]))
+            number, point = self._served(series, loads[count:end], values[count:end])
             if point is None:
                 break
             count += number
@@ -133,33 +135,24 @@ class StablePath:
             served = errors <= CURVE_TOLERANCE
         return values, good, count
 
-    def _served_loads(
-        self, series: Expansion, loads: np.ndarray, values: np.ndarray, served: np.ndarray
-    ) -> tuple[int, _Point | None]:
-        """Return how many successive loads a series serves, and the corrected point at the last of them."""
-        number = len(served) if served.all() else int(np.argmin(served))
+    def _served(self, series: Expansion, loads: np.ndarray, values: np.ndarray) -> tuple[int, _Point | None]:
+        """Return how many of successive loads a series serves, and the corrected point at the last of them."""
+        network, number = self.problem.network, len(loads)
         while number > 0:
-            point = self._point(series, loads[number - 1], values[number - 1])
-            if point is not None and point.error <= CURVE_TOLERANCE:
-                return number, point
+            s, value = loads[number - 1], values[number - 1]
+            displacements = series.at(s - series.s)[1]
+            if np.isfinite(displacements).all() and not network.inverted(displacements):
+                with suppress(SingularError):
+                    factor = network.factorize_tangent(displacements)
+                    point = self._corrected(s, value, displacements, factor, factor.negative_pivots == 0)
+                    if point.error <= CURVE_TOLERANCE:
+                        return number, point
             number -= 1 + number // 8
         return 0, None
 
     def _series_of(self, load: float) -> Expansion:
         """The first series that serves a load."""
         return next(series for series, last in self._series if load <= last)
-
-    def _point(self, series: Expansion, s: float, value: float) -> _Point | None:
-        """The point at a load that a series predicts; None where there is none."""
-        network = self.problem.network
-        displacements = series.at(s - series.s)[1]
-        if not np.isfinite(displacements).all() or network.inverted(displacements):
-            return None
-        try:
-            factor = network.factorize_tangent(displacements)
-            return self._corrected(s, value, displacements, factor, factor.negative_pivots == 0)
-        except SingularError:
-            return None
 
     def _corrected(self, s: float, value: float, displacements: np.ndarray, factor: Factor, stable: bool) -> _Point:
         """A predicted point, corrected by steps with one tangent; its error is that of a value."""
@@ -238,16 +231,12 @@ class StablePath:
         """Keep series values beyond the stable path: equilibria, though not on that path."""
         rest, others = self._rest, np.flatnonzero(good & ~found)
         for group in np.split(others, np.flatnonzero(np.diff(others) > 1) + 1):
-            while len(group):
-                last = self._point(rest, loads[group[-1]], values[group[-1]])
-                if last is not None and last.error <= CURVE_TOLERANCE:
-                    break
-                group = group[: -1 - len(group) // 8]
-            for start, place in enumerate(group):  # the nearest to the path's turn is the worst
+            number, last = self._served(rest, loads[group], values[group])
+            for start, place in enumerate(group[:number]):  # the nearest to the path's turn is the worst
                 assert last is not None
                 s = loads[place]
                 if self._corrected(s, values[place], rest.at(s)[1], last.factor, False).error <= CURVE_TOLERANCE:
-                    found[group[start:]] = True
+                    found[group[start:number]] = True
                     break
 
     # -- beyond it --------------------------------------------------------------------------------------------------

@@ -3,10 +3,9 @@
 The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is force over reference stiffness [m]. So
 one path serves every force, material and uniform stiffness of a mesh.
 
-The path u(s) is analytic, and an `Expansion` is its power series about one of its points. It costs one factorization
-and one back-substitution an order (asymptotic numerical method: Cochelin, Damil and Potier-Ferry, Revue europeenne des
-elements finis 3(2):281, 1994). Pade approximants continue it past its poles; the nearest pole is the buckling load,
-even for a beam in tension.
+The path u(s) is analytic. Its power series, an `Expansion`, costs one factorization and one back-substitution an order
+(asymptotic numerical method: Cochelin, Damil and Potier-Ferry, Revue europeenne des elements finis 3(2):281, 1994).
+Pade approximants continue it past its poles; the nearest is the buckling load, even for a beam in tension.
 """
 
 from collections.abc import Callable
@@ -45,11 +44,8 @@ LARGEST_BEND = 0.1
 """Largest distance of a parabola's middle from the straight way's, over its length, to use it."""
 
 FORESEEN_SHARE, WORK_SHARE = 0.25, 0.02
-"""Limits below which no snap can lie on the way to an equilibrium.
-
-Its distance from a guess over the way to it; and the work of out-of-balance forces in the middle of the way over the
-load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05.
-"""
+"""Limits without a snap: distance from the guess over the way, and work of out-of-balance forces in its middle over the
+load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05."""
 
 WAY_INCREMENTS = 8
 """Increments of a path behind a limit point, over the straight way from there to a stable equilibrium."""

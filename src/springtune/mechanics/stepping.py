@@ -29,7 +29,7 @@ MOST_PASS_STEPS = 8
 
 
 class Moving:
-    """Network with masses, dampers and a load, see `springtune.mechanics.dynamics.Motion`."""
+    """Network with masses, dampers and a load, over the `reference` stiffness [N/m]; `mass_damping` is alpha [1/s]."""
 
     def __init__(
         self,

@@ -283,14 +283,13 @@ class Problem:
             return not supported.keys().isdisjoint(side.groups)
 
         self.corners = corners_of(self.mesh, condition, held, mirror)
-        at_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
+        self.loaded_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
         rough = {point for point, corner in self.corners.items() if corner.rough}
         for name in used:
-            what = "a force acts on a point" if name in at_points else "a point is held"
+            what = "a force acts on a point" if name in self.loaded_points else "a point is held"
             self.corners[self.mesh.named[name]] = Corner(what)
         self.rough = rough | {self.mesh.named[name] for name in used | probed}
-        self.loaded_points = at_points
-        self.infinite_energy = bool(at_points)
+        self.infinite_energy = bool(self.loaded_points)
         self.reacting: list[str] = []
         self.kinds = {quantity.name: quantity.kind for quantity in load.quantities} | {"": "energy"}
         self._quantities = {quantity.name: quantity for quantity in load.quantities}
@@ -314,12 +313,10 @@ class Problem:
             if len(set(beside.tolist())) > 1:
                 why = f"{of!r} is where parts of different materials meet, and the stress has a jump there"
                 raise ValueError(f"quantity {name!r}: {why}: ask for it on one side")
-        infinite = {"displacement": "the displacement", "stress": "the stress"}.get(kind)
-        if infinite:
-            for point in self.loaded_points if of in self.points else ():
-                if np.allclose(self.points[point], self.points[of], rtol=0, atol=1e-9 * np.ptp(self.mesh.points)):
-                    why = f"{infinite} under a point force is infinite in a continuum"
-                    raise ValueError(f"quantity {name!r}: {why}: spread the force on {point!r} over a side")
+        for point in self.loaded_points if kind in ("displacement", "stress") and of in self.points else ():
+            if np.allclose(self.points[point], self.points[of], rtol=0, atol=1e-9 * np.ptp(self.mesh.points)):
+                why = f"the {kind} under a point force is infinite in a continuum"
+                raise ValueError(f"quantity {name!r}: {why}: spread the force on {point!r} over a side")
         if kind == "energy" and self.infinite_energy:
             why = "the energy of a point force is infinite in a continuum"
             points = ", ".join(sorted(self.loaded_points))
@@ -382,13 +379,10 @@ class Level:
         thickness = problem.shape.thickness
         # Stiffness by axes: of strain d u_c / d x_a on stress along d, b.
         self._tensor = thickness * problem.stiffness[:, VOIGT[:, :, None, None], VOIGT[None, None]]
-        matrices = self._matrices()
-        forces = self.forces()
+        matrices, forces = self._matrices(), self.forces()
         held, prescribed = self.supports()
-        solution, self.residual, self.energy = self._solve(matrices, forces, held, prescribed)
-        self.field = solution
-        self.held = held
-        free = ~held
+        self.field, self.residual, self.energy = self._solve(matrices, forces, held, prescribed)
+        self.held, free = held, ~held
         forcing = max(np.abs(self.residual[held]).max(initial=0.0), np.abs(forces).max(initial=0.0))
         self.round_off = float(np.abs(self.residual[free]).max(initial=0.0) / forcing) if forcing else 0.0
         self.unknowns = int(free.sum())

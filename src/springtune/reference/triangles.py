@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import Legendre, legder, leggauss, legval
@@ -339,54 +340,44 @@ def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], exten
 
 def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     """Names of parts, and straight pieces around and between the parts of a mesh."""
-    mesh = grouped.mesh
+    mesh, labels = grouped.mesh, part_names(grouped)
     names = tuple(dict.fromkeys(["", *grouped.parts]))
-    ways, parts, labels = [], [], part_names(grouped)
+    part_of: dict[_Ends, int] = {}  # to the left of each way around a cell
     for count, cells in mesh.cells.items():
-        of_cells = np.array([names.index(name) for name in labels[count]])
+        parts = [names.index(name) for name in labels[count]]
         for i in range(count):
-            ways.append(cells[:, [i, (i + 1) % count]])
-            parts.append(of_cells)
-    n = len(mesh.points)
-    way, part = np.concatenate(ways), np.concatenate(parts)
-    codes, twins = way[:, 0] * n + way[:, 1], way[:, 1] * n + way[:, 0]
-    order = np.argsort(codes)
-    found = np.minimum(np.searchsorted(codes[order], twins), len(codes) - 1)
-    other = order[found]
-    outer = codes[other] != twins
-    between = ~outer & (part < part[other])
+            part_of.update(zip(zip(cells[:, i].tolist(), cells[:, (i + 1) % count].tolist()), parts))
     groups: dict[_Ends, tuple[str, ...]] = {}
     for name, edges in grouped.sides.items():
         for first, second in np.sort(edges, axis=1).tolist():
             groups[first, second] = (*groups.get((first, second), ()), name)
-    leaving: dict[int, list[int]] = {}
-    arriving: dict[int, list[int]] = {}
-    keys: dict[int, tuple[tuple[str, ...], int, int]] = {}  # what is beside a way
-    for row in np.flatnonzero(outer | between).tolist():
-        first, second = way[row].tolist()
-        right = 0 if outer[row] else int(part[other[row]]) + 1
-        keys[row] = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
-        leaving.setdefault(first, []).append(row)
-        arriving.setdefault(second, []).append(row)
-    following: dict[int, int] = {}  # where a way goes on straight
-    for here, rows in leaving.items():
-        if len(rows) == len(arriving.get(here, ())) == 1 and keys[rows[0]] == keys[arriving[here][0]]:
-            before, there = way[arriving[here][0], 0], way[rows[0], 1]
+    leaving: dict[int, list[_Ends]] = {}
+    arriving: dict[int, list[_Ends]] = {}
+    keys: dict[_Ends, tuple[tuple[str, ...], int, int]] = {}  # what is beside a way
+    for (first, second), part in part_of.items():
+        other = part_of.get((second, first), -1)
+        if other < 0 or part < other:
+            keys[first, second] = groups.get((min(first, second), max(first, second)), ()), part + 1, other + 1
+            leaving.setdefault(first, []).append((first, second))
+            arriving.setdefault(second, []).append((first, second))
+    following: dict[_Ends, _Ends] = {}  # where a way goes on straight
+    for here, ways in leaving.items():
+        if len(ways) == len(arriving.get(here, ())) == 1 and keys[ways[0]] == keys[arriving[here][0]]:
+            before, there = arriving[here][0][0], ways[0][1]
             one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
             if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT_TURN * (one @ two):
-                following[arriving[here][0]] = rows[0]
-    pieces = []
-    for row in [row for rows in leaving.values() for row in rows if row not in set(following.values())]:
-        last = row
+                following[before, here] = here, there
+    pieces, inner = [], set(following.values())
+    for way in (way for ways in leaving.values() for way in ways if way not in inner):
+        last = way
         while last in following:
             last = following[last]
-        start, end = (tuple(mesh.points[point].tolist()) for point in (way[row, 0], way[last, 1]))
-        pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *keys[row]))
+        start, end = (tuple(mesh.points[point].tolist()) for point in (way[0], last[1]))
+        pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *keys[way]))
     return names, pieces
 
 
-@dataclass(frozen=True)
-class Corner:
+class Corner(NamedTuple):
     """Corner of the outline or of parts; `rough` where a solution is not smooth enough for even triangles."""
 
     what: str
