@@ -6,3 +6,8 @@ QUANTITIES = {
     "best_stiffness": "uniform stiffness without an error",
 }
 """Quantities with Sobol indices."""
+
+
+def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
+    """Key of a reference that is solved alone, in the file of the interpolant that could not be built."""
+    return f"{interpolant} {float(aspect_ratio)!r} {float(nu)!r}"

@@ -17,9 +17,8 @@ from ...config.kind import declared_variables
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
-from . import QUANTITIES
+from . import QUANTITIES, problem_key
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
-from .interpolate import problem_key
 from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
