@@ -85,13 +85,10 @@ class Mesh:
 
     >>> mesh.sum_to_edges({3: np.ones((2, 3))}).tolist()  # edges of the cells, counted
     [1.0, 2.0, 1.0, 1.0, 1.0]
-    >>> right = mesh.outline_edges(0, 1.0)
-    >>> right.tolist()
+    >>> mesh.outline_edges(0, 1.0).tolist()
     [[1, 2]]
     >>> mesh.inverted(mesh.points * [-1, -1]), mesh.inverted(mesh.points * [-1, 1])  # rotated, mirrored
     (False, True)
-    >>> st.Mesh(2 * points, mesh.triangles).shares_cells(mesh)
-    True
 
     As one quadrilateral it has both diagonals:
 
@@ -151,23 +148,6 @@ class Mesh:
             raise MeshError(f"{first}, and a plane has two sides; remove some")
         parts = np.split(places, [next(iter(joins.values())).size // 2])
         return edges, counts, {count: part.reshape(one.shape[:2]) for (count, one), part in zip(joins.items(), parts)}
-
-    def shares_cells(self, other: "Mesh") -> bool:
-        """Return whether another mesh has the same cells; data that depend only on cells are then shared.
-
-        Parameters
-        ----------
-        other : Mesh
-
-        Returns
-        -------
-        bool
-        """
-        cells, others = ((one.triangles, one.quads, one.bonds) for one in (self, other))
-        same = len(self.points) == len(other.points) and all(map(np.array_equal, cells, others))
-        if same:
-            vars(self).update(_edges=other._edges, on_outline=other.on_outline)
-        return same
 
     @property
     def edges(self) -> np.ndarray:
@@ -277,6 +257,15 @@ def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
         numbers = "numbers" if kind is float else "whole numbers"
         raise MeshError(f"{name}: {shape}; give an array of {numbers} of shape (n, {columns})")
     return given.astype(kind, copy=False)
+
+
+def share_edges(mesh: Mesh, other: Mesh) -> bool:
+    """Return whether two meshes have the same cells; the first one then takes the other's edges."""
+    cells, others = ((one.triangles, one.quads, one.bonds) for one in (mesh, other))
+    same = len(mesh.points) == len(other.points) and all(map(np.array_equal, cells, others))
+    if same:
+        vars(mesh).update(_edges=other._edges, on_outline=other.on_outline)
+    return same
 
 
 def side_shares(mesh: Mesh, edges: np.ndarray, axis: int) -> np.ndarray:

@@ -569,8 +569,8 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     found = {part: given.get(part, given.get("")) for part in parts}
     for part, one in found.items():
         if one is None:
-            said = f"part {part!r}" if part else "the main part, ''"
-            raise ValueError(f"material: {said} has none; given: {', '.join(map(repr, given)) or 'none'}")
+            which = f"part {part!r}" if part else "the main part, ''"
+            raise ValueError(f"material: {which} has none; given: {', '.join(map(repr, given)) or 'none'}")
     return {part: one for part, one in found.items() if one is not None}
 
 

@@ -51,16 +51,16 @@ class TensileTest:
     def __post_init__(self) -> None:
         order = np.argsort(self.stretch, kind="stable")
         stretch, stress = self.stretch[order], self.stress[order]
-        told = stretch != 1
-        wrong = told & ((stress > 0) != (stretch > 1))
+        loaded = stretch != 1
+        wrong = loaded & ((stress > 0) != (stretch > 1))
         if wrong.any():
             place = int(np.argmax(wrong))
             found = f"a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is positive"
             remedy = "give nominal stress over stretch (1 plus strain), or name the column 'strain'"
             raise TestDataError(f"{self.name}: {found}; {remedy}")
-        if len(np.unique(stretch[told])) < 3:
+        if len(np.unique(stretch[loaded])) < 3:
             raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")
-        put(self, stretch=stretch[told], stress=stress[told])
+        put(self, stretch=stretch[loaded], stress=stress[loaded])
 
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":

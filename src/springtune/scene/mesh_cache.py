@@ -15,7 +15,7 @@ from ..mechanics.continuum import lateral_forces
 from ..mechanics.network import FollowerPressure, Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
-from ..mesh.cells import Mesh
+from ..mesh.cells import Mesh, share_edges
 from ..mesh.sheets import GroupedMesh
 from ..problem.boundary import held, loaded_box, measured, side_edges, weights
 from ..problem.loads import LoadKind
@@ -140,7 +140,7 @@ class MeshCache:
         self.references: dict[tuple[object, ...], Any] = {}
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
         self._typical: tuple[np.ndarray, dict[str, float]] | None = None
-        self._patterns: dict[bytes, Network] = dict(like._patterns) if like and mesh.shares_cells(like.mesh) else {}
+        self._patterns: dict[bytes, Network] = dict(like._patterns) if like and share_edges(mesh, like.mesh) else {}
         self._networks: dict[bytes, KnownNetwork] = {}
 
     def derive(
