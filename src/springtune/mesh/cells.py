@@ -107,8 +107,7 @@ class Mesh:
             kind = float if name == "points" else np.int64
             object.__setattr__(self, name, _array(getattr(self, name), name, count, kind))
         points = self.points
-        lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if len(lost):
+        if len(lost := np.flatnonzero(~np.isfinite(points).all(axis=1))):
             raise MeshError(f"points: {len(lost)} are nowhere, the first one {lost[0]}; give finite coordinates in m")
         if not self.cells:
             raise MeshError("there are no cells; give triangles, quads or both")

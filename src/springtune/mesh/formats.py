@@ -126,8 +126,7 @@ def _build_mesh(
     for count, corners in cells.items():
         cells[count] = corners = upright(points, np.searchsorted(used, corners))
         areas = signed_areas(points, corners)
-        flat = corners[areas <= 1e-12 * areas.max(initial=0.0)]
-        if len(flat):
+        if len(flat := corners[areas <= 1e-12 * areas.max(initial=0.0)]):
             first = in_words(points[flat[0]])
             raise MeshError(f"{path}: cells with no area: {len(flat)}, the first one at {first}; remove them")
     return Mesh(points, cells[3], cells[4]), used
@@ -184,8 +183,7 @@ def _read_vtu(raw: bytes) -> Content:
         raise MeshError("is compressed by LZ4, which is not read; write it with ZLib, or without compression")
     if re.search(rb"type\s*=\s*.P(Unstr|Poly)", head):
         raise MeshError(abaqus.OTHER_FILES_REASON)
-    pieces = len(re.findall(rb"<Piece\b", head))
-    if pieces > 1:
+    if (pieces := len(re.findall(rb"<Piece\b", head))) > 1:
         raise MeshError(f"has {pieces} pieces, and one is read; join them, in ParaView by the filter Clean to Grid")
     with TemporaryDirectory() as folder:
         file = Path(folder) / "piece.vtu"

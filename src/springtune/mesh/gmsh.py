@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -30,18 +31,17 @@ class _Numbers:
     """Numbers of a section, one after the other; `order` is that of bytes, empty for text."""
 
     def __init__(self, raw: bytes, order: str, size: int):
-        self.raw, self.order, self.size, self.at, self.total = raw, order, size, 0, 0
-        self.values = np.zeros(0) if order else np.fromstring(raw.decode("ascii", "replace"), sep=" ")
+        self.order, self.size, self.at, self.total = order, size, 0, 0
+        self.source: Any = raw if order else np.fromstring(raw.decode("ascii", "replace"), sep=" ")
 
     def take(self, kind: str, count: int) -> np.ndarray:
         """Return the next numbers: ``i`` are integers, ``u`` counts and tags, ``f`` coordinates."""
         width = {"i": 4, "u": self.size, "f": 8}[kind] if self.order else 1
-        piece = slice(self.at, self.at + count * width)
-        self.at = piece.stop
-        source = self.raw if self.order else self.values
-        if len(source) < piece.stop:
+        piece = self.source[self.at : self.at + count * width]
+        self.at += count * width
+        if len(piece) < count * width:
             raise ValueError("it states other numbers of points or cells than it has")
-        values = np.frombuffer(self.raw[piece], f"{self.order}{kind}{width}") if self.order else self.values[piece]
+        values: np.ndarray = np.frombuffer(piece, f"{self.order}{kind}{width}") if self.order else piece
         return values if kind == "f" else values.astype(np.int64)
 
     def one(self, kind: str) -> int:
@@ -80,9 +80,8 @@ def read(raw: bytes) -> Content | None:
     for _ in range(elements.blocks()):
         dimension, entity, kind = elements.take("i", 3).tolist()
         if kind not in ELEMENT_TYPES:
-            raise MeshError(
-                f"has cells '{OTHER_ELEMENTS.get(kind, kind)}'; {LINEAR_CELLS_REMEDY}: Mesh.ElementOrder = 1"
-            )
+            other = OTHER_ELEMENTS.get(kind, kind)
+            raise MeshError(f"has cells '{other}'; {LINEAR_CELLS_REMEDY}: Mesh.ElementOrder = 1")
         count, width = elements.one("u"), 1 + ELEMENT_TYPES[kind][1]
         corners = elements.take("u", count * width).reshape(count, width)[:, 1:]
         own = [names.get((dimension, tag), str(tag)) for tag in groups.get((dimension, entity), ())]

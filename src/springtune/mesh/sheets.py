@@ -44,8 +44,7 @@ def sheet_fault(mesh: Mesh) -> str:
         count = f"outline edges that meet others without being joined: {len(touching)}"
         first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"
         return opening(points, outline[touching], count) or f"cells overlap ({first}); remove some"
-    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
-    if len(again):
+    if len(again := np.flatnonzero(np.bincount(outline[:, 0]) > 1)):
         where = in_words(points[again[0]])
         return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
     for line in rounds(outline):
@@ -61,8 +60,7 @@ def convexity_fault(mesh: Mesh) -> str:
     points = mesh.points
     for count, corners in mesh.cells.items():
         turns = [signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) for i in range(count)]
-        bad = corners[np.min(turns, axis=0) <= 0]
-        if len(bad):
+        if len(bad := corners[np.min(turns, axis=0) <= 0]):
             first = f"{len(bad)}, the first one at {in_words(points[bad[0]])}"
             return f"cells with a corner of 180 degrees or more: {first}; split them into triangles"
     return ""
@@ -89,8 +87,7 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
 
     small = COORDINATE_TOLERANCE * np.ptp(points, axis=0).max()
     ends = np.unique(edges)
-    twins = sorted(cKDTree(points[ends]).query_pairs(small))
-    if twins:
+    if twins := sorted(cKDTree(points[ends]).query_pairs(small)):
         one, other = points[ends[[*twins[0]]]]
         distance = np.linalg.norm(other - one)
         apart = f", {1e3 * distance:.3g} mm apart" if distance else ""
@@ -128,8 +125,7 @@ def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
     near = np.abs(mesh.points - box) <= COORDINATE_TOLERANCE * box
     points = np.where(near, box, np.where(mesh.points <= COORDINATE_TOLERANCE * box, 0.0, mesh.points))
     for corners in mesh.cells.values():
-        flat = corners[signed_areas(points, corners) <= 0]
-        if len(flat):
+        if len(flat := corners[signed_areas(points, corners) <= 0]):
             first = f"{len(flat)}, the first one at {in_words(points[flat[0]])}"
             raise MeshError(f"cells within rounding of a side of the box: {first}; make them larger or remove them")
     return replace(mesh, points=points)
@@ -164,8 +160,7 @@ def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:
     outline, _ = outline_of(mesh)
     ends = mesh.points[outline]
     on_side = [(ends[..., axis] == value).all(axis=1) for axis in range(2) for value in (0.0, box[axis])]
-    inside = outline[~np.any(on_side, axis=0)]
-    if len(inside) and not fault:
+    if len(inside := outline[~np.any(on_side, axis=0)]) and not fault:
         first = edge_in_words(mesh.points, inside[0])
         fault = f"edges inside the box with one cell only: {len(inside)}, the first one {first}; close the hole there"
     return f"its cells cover {100 * share:.6g} % of the box or overlap: {fault}" if fault and wrong else fault
@@ -344,8 +339,7 @@ def side_fault(grouped: GroupedMesh, name: str, directed: bool) -> str:
     """Return why a group of sides is not usable, with the remedy, or ""; `directed` edges have the body on the left."""
     count, edges = len(grouped.mesh.points), np.reshape(grouped.sides[name], (-1, 2))
     wrong = edges[~np.isin(edges @ [count, 1], grouped._outline_codes)]
-    inside = wrong[~np.isin(wrong @ [1, count], grouped._outline_codes)]
-    if len(inside):
+    if len(inside := wrong[~np.isin(wrong @ [1, count], grouped._outline_codes)]):
         first = edge_in_words(grouped.mesh.points, inside[0])
         return f"has edges that are not on the outline, the first one {first}; take these out"
     if directed and len(wrong):

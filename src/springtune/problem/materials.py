@@ -303,8 +303,7 @@ class AnisotropicMaterial:
         for constant in CONSTANTS:
             read = positive if constant in ("C11", "C22", "C66") else quantity
             put(self, **{constant: read(getattr(self, constant), "stress", constant)})
-        fault = indefinite(self.C11, self.C22, self.C12, self.C66, self.C16, self.C26)
-        if fault:
+        if fault := indefinite(*(getattr(self, constant) for constant in CONSTANTS)):
             raise ValueError(f"material {self.name!r}: {fault}")
 
     @classmethod

@@ -172,10 +172,7 @@ def _check_name(value: object, what: str, *, empty: bool = False) -> None:
 
 def _tuple_of(values: Any, wanted: type, name: str) -> tuple[Any, ...]:
     """Tuple of values of a type."""
-    try:
-        found = tuple(values)
-    except TypeError:
-        found = (values,)
+    found = tuple(values) if isinstance(values, Iterable) else (values,)
     for one in found:
         if not isinstance(one, wanted):
             raise ValueError(f"{name}: {one!r} is not a {wanted.__name__}; give springtune.{wanted.__name__}(...)")
