@@ -38,20 +38,16 @@ class _Section(NamedTuple):
     line: int
     keyword: str
     given: dict[str, str]
-    rows: list[str]
+    rows: list[list[str]]
 
     def refused(self, why: str) -> MeshError:
         """Error that names this section."""
         return MeshError(f"`*{self.keyword}` in line {self.line} {why}")
 
-    def items(self) -> Iterator[list[str]]:
-        """Return the items of each row."""
-        return ([item.strip().strip("'\"") for item in row.split(",")] for row in self.rows)
-
 
 def _sections(text: str) -> Iterator[_Section]:
     """Sections without comments and empty lines; a keyword's line that ends in a comma goes on."""
-    heads: list[tuple[int, str, list[str]]] = []
+    heads: list[tuple[int, str, list[list[str]]]] = []
     for number, line in enumerate(map(str.strip, text.splitlines()), 1):
         if not line or line.startswith("**"):
             continue
@@ -60,7 +56,7 @@ def _sections(text: str) -> Iterator[_Section]:
         elif line.startswith("*"):
             heads.append((number, line, []))
         elif heads:
-            heads[-1][2].append(line)
+            heads[-1][2].append([item.strip().strip("'\"") for item in line.split(",")])
     for number, head, rows in heads:
         keyword, *words = head[1:].split(",")
         pairs = (word.partition("=") for word in words)
@@ -112,7 +108,7 @@ class _Model:
         """Add points, and return their numbers."""
         if one.given.get("SYSTEM", "R").upper() != "R":
             raise one.refused(f"has SYSTEM={one.given['SYSTEM']}; write x and y")
-        rows = [[float(item.upper().replace("D", "E") or 0) for item in (row + ["", ""])[:4]] for row in one.items()]
+        rows = [[float(item.upper().replace("D", "E") or 0) for item in (row + ["", ""])[:4]] for row in one.rows]
         self.points += [(row + [0.0])[:4] for row in rows]
         return np.array([row[0] for row in rows], dtype=np.int64)
 
@@ -123,7 +119,7 @@ class _Model:
         name, count = {"3": ("triangle", 3), "4": ("quad", 4)}.get(surface[1] if surface else "", ("line", 2))
         if not surface and not line:
             raise one.refused(f"has TYPE={given}, which is not supported; write linear CPS3, CPS4 and T2D2 only")
-        numbers = [int(item) for row in one.items() for item in row if item]
+        numbers = [int(item) for row in one.rows for item in row if item]
         if len(numbers) % (count + 1):
             raise one.refused(f"has TYPE={given}, and rows that are not {count + 1} numbers; correct them")
         self.elements.append((name, np.array(numbers, dtype=np.int64).reshape(-1, count + 1)))
@@ -133,7 +129,7 @@ class _Model:
         """Numbers of points or cells in a set, by numbers, ranges and names of sets before it."""
         found = [np.zeros(0, dtype=np.int64)]
         wanted = [("ELSET", one.given["ELSET"])] if one.keyword == "NSET" and "ELSET" in one.given else []
-        for row in one.items():
+        for row in one.rows:
             numbers = [int(item) for item in row if item.isdigit()]
             if "GENERATE" in one.given:
                 numbers = [*range(numbers[0], numbers[1] + 1, (*numbers, 1)[2])]
