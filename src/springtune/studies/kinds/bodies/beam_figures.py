@@ -3,6 +3,7 @@
 from functools import partial
 
 import numpy as np
+import xarray as xr
 from matplotlib.lines import Line2D
 
 from springtune.problem.loads import LOADS
@@ -36,18 +37,19 @@ LARGEST_ERROR_SHOWN = 60.0
 
 def sensitivity(tree):
     """Stem, plotting function and selection of each figure of sensitivity curves."""
-    yield from figures_of("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
+    present = group(tree, "sensitivity").status != 0
+    for stem, selection in distinct("sensitivity", SENSITIVITY_LABELS, cells(present, SENSITIVITY_LABELS)).items():
+        yield stem, plot_sensitivity, selection | {"kinematics": usual_kinematics(present.sel(selection))}
 
 
 USUAL_KINEMATICS = "nonlinear"
 """Kinematics of figures; a study without them shows its first kinematics, which the title names."""
 
 
-def figures_of(name, plot, status, names):
-    """Stem, plotting function and selection of each figure with cells, in the usual or else the first kinematics."""
-    for stem, selection in distinct(name, names, cells(status != 0, names)).items():
-        there = labels_of((status != 0).sel(selection), "kinematics")
-        yield stem, plot, selection | {"kinematics": USUAL_KINEMATICS if USUAL_KINEMATICS in there else there[0]}
+def usual_kinematics(present):
+    """Return the usual kinematics if cells have them, else their first ones."""
+    there = labels_of(present, "kinematics")
+    return USUAL_KINEMATICS if USUAL_KINEMATICS in there else there[0]
 
 
 @style.styled
@@ -192,18 +194,35 @@ def title_labels(selection, *names):
 
 
 def by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data, beams and selection of a figure with one panel a beam."""
+    """Data, beams and selection of a figure with one panel a beam; without kinematics `in_usual_kinematics`."""
     if beam is not None:
         choose(root.status != 0, beam=beam)
         root = root.sel(beam=[beam])
+    chosen = {"mesh_type": mesh_type, "material": material, "load": load}
+    if kinematics is None:
+        selection = choose((root.status != 0).any("kinematics"), **chosen)
+        root, selection["kinematics"] = in_usual_kinematics(root.sel(selection))
+    else:
+        selection = choose(root.status != 0, **chosen, kinematics=kinematics)
+        root = root.sel(selection)
+    return root, labels_of(root.status != 0, "beam"), selection
+
+
+def in_usual_kinematics(root):
+    """Cells of each definition in its usual kinematics, named if they are not those of the figure, and the latter."""
     present = root.status != 0
-    selection = choose(present, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics)
-    return root.sel(selection), labels_of(present.sel(selection), "beam"), selection
+    whole, names = usual_kinematics(present), labels_of(present, "definition")
+    own = [usual_kinematics(present.sel(definition=name)) for name in names]
+    labels = [name if kinematics == whole else f"{name}, {kinematics}" for name, kinematics in zip(names, own)]
+    pairs = {
+        name: xr.DataArray(values, dims="definition") for name, values in (("definition", names), ("kinematics", own))
+    }
+    return root.sel(pairs).drop_vars("kinematics").assign_coords(definition=labels), whole
 
 
 # -- deformed networks -------------------------------------------------------------------------------------------------
 
-SHOWN_FIRST = ("lattice", "calibrated", "paper")
+SHOWN_FIRST = ("patch", "delingette", "lattice", "calibrated", "paper")
 """Definitions whose deformed network is preferred."""
 
 
@@ -211,10 +230,13 @@ def deformed(tree):
     """Stem, plotting function and selection of each figure of deformed networks."""
     status = group(tree, "/").status
     status = status.sel(definition=group(tree, "fields").definition.values)
-    for stem, plot, selection in figures_of("deformed", plot_deformed, status, SCENE_LABELS):
+    for stem, selection in distinct("deformed", SCENE_LABELS, cells(status != 0, SCENE_LABELS)).items():
         here = status.sel(selection)
-        names = labels_of(here.isin((1, 2, 4)), "definition") or labels_of(here != 0, "definition")
-        yield stem, plot, selection | {"definition": next((name for name in SHOWN_FIRST if name in names), names[0])}
+        present = here.isin((1, 2, 4)) if here.isin((1, 2, 4)).any() else here != 0
+        names = labels_of(present, "definition")
+        definition = next((name for name in SHOWN_FIRST if name in names), names[0])
+        kinematics = usual_kinematics(present.sel(definition=definition))
+        yield stem, plot_deformed, selection | {"definition": definition, "kinematics": kinematics}
 
 
 @style.styled
@@ -305,7 +327,9 @@ def title_of_errors(root, selection):
     """Title of a figure of errors."""
     words = title_labels(selection, "mesh_type", "material", "load")
     finite = "finite_strain" in root.attrs and selection["kinematics"] != "linear"
-    return ", ".join([*words, *(["against finite strain"] if finite else [])])
+    mixed = any(str(name).endswith(", linear") for name in root.definition.values)
+    against = "against finite strain" + (" (linear: small strain)" if mixed else "")
+    return ", ".join([*words, *([against] if finite else [])])
 
 
 def _line_styles(root):
@@ -360,11 +384,13 @@ def _draw_lines(panel, places, here, looks, listed, gaps):
 
 def size(tree):
     """Stem, plotting function and selection of each figure of errors against mesh size."""
-    yield from figures_of("size", plot_size, group(tree, "/").status, SCENE_LABELS)
+    present = group(tree, "/").status != 0
+    for stem, selection in distinct("size", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
+        yield stem, plot_size, selection
 
 
 @style.styled
-def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"):
+def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics=None):
     """Deformation error against mesh size, a panel a beam, a line a definition.
 
     Parameters
@@ -374,7 +400,9 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     ax : Figure or sequence of Axes, optional
     beam : str, optional
         One beam in place of all.
-    mesh_type, material, load, kinematics : str, optional
+    mesh_type, material, load : str, optional
+    kinematics : str, optional
+        By default nonlinear; definitions that have none are shown in linear kinematics, and named so.
 
     Returns
     -------
