@@ -164,6 +164,13 @@ def test_errors_of_nonlinear_networks_are_against_finite_strain(tree, kinematics
     assert panels[0].figure.get_suptitle().endswith("against finite strain") == (kinematics == "nonlinear")
 
 
+def test_definitions_of_linear_kinematics_alone_are_named(tree):
+    data, first = tree.to_dataset(), DEFINITIONS[0]
+    data["status"] = data.status.where((data.definition != first) | (data.kinematics == "linear"), 0)
+    panel = st.plot_size(data, mesh_type="structured", material="steel", load="traction")[0]
+    assert {f"{first}, linear", DEFINITIONS[1]} <= {line.get_label() for line in panel.get_lines()}
+
+
 def test_moduli_are_of_the_finest_patch(tree):
     for panel, mesh_type in zip(st.plot_moduli(tree), TYPES):
         for definition in DEFINITIONS:
