@@ -148,7 +148,7 @@ MOST_CHARACTERS = 4_200_000
 def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
     """Describe and pack the groups of a dataset; leave out and name the largest variables if there is no room."""
     children = [group for group in file.groups.values() if group.variables]
-    groups = [_describe(group, group.variables, file.variables) for group in (file, *children)]
+    groups = [_describe(group, file.variables) for group in (file, *children)]
     rows = [(group, row) for group in groups for row in group["variables"]]
     excess = sum(len(row["data"]) for _, row in rows) - room
     # Cells last: without them there is no table.
@@ -163,10 +163,9 @@ def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, A
 StoredVariables = Mapping[str, h5netcdf.Variable]
 
 
-def _describe(group: h5netcdf.Group, own: StoredVariables, root: StoredVariables) -> dict[str, Any]:
-    """Describe and pack a group: its `own` variables, with labels that it may share with the `root`."""
-    rows: list[dict[str, Any]] = []
-    sizes: dict[str, int] = {}
+def _describe(group: h5netcdf.Group, root: StoredVariables) -> dict[str, Any]:
+    """Describe and pack a group: its own variables, with labels that it may share with the `root`."""
+    own, rows, sizes = group.variables, list[dict[str, Any]](), dict[str, int]()
     for name, stored in own.items():
         if stored.dimensions == (name,):
             sizes[name] = len(stored)
@@ -236,15 +235,14 @@ REFERENCES = {
 
 def _mark_beyond_linear(own: StoredVariables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
     """Give solved cells that the linear reference cannot judge a status of their own."""
-    flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
     applies = own.get("reference_applies")
-    if "solved" not in flags or applies is None or not set(applies.dimensions) <= set(row["dims"]):
+    if "flags" not in row or applies is None or not {*applies.dimensions} <= {*row["dims"]}:
         return status
-    beyond = max(flags.values()) + 1
-    found = np.where((status == flags["solved"]) & (_broadcast(applies, row["dims"]) == 0), beyond, status)
-    if (found == beyond).any():
+    marked = (status == Status.SOLVED) & (_broadcast(applies, row["dims"]) == 0)
+    beyond = len(row["flags"])
+    if marked.any():
         row["flags"][str(beyond)] = "beyond_linear"
-    return found
+    return np.where(marked, beyond, status)
 
 
 def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
@@ -259,7 +257,7 @@ def _sign_sentence(name: str, own: StoredVariables, root: StoredVariables) -> st
     reference = REFERENCES.get(name, "reference_displacement")
     reference = reference if reference in own else "reference_displacement"
     group = own if reference in own else root
-    if reference not in group or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
+    if reference not in group or not re.fullmatch("(deformation_|face_|expected_)?error", name):
         return "positive: too large"
     dims, others, values = group[reference].dimensions, False, group[reference][...]
     if "quantity_kind" in group:
