@@ -207,8 +207,8 @@ def _shape_table(tree):
     columns = {"mesh_size_mm": ("mesh_size", 1e3), "particles": ("particles", 1), "value": ("value", 1)}
     columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
     columns |= {f"{name}_percent": (name, 100) for name in SHAPE_ERRORS}
-    columns |= {"sign": ("quantity_kind", 1), "kind": ("quantity_kind", 1), "edge_length": ("edge_length", 1)}
-    columns |= {name: (name, 1) for name in ("status", "message")}
+    columns |= {"sign": ("quantity_kind", 1), "kind": ("quantity_kind", 1)}
+    columns |= {name: (name, 1) for name in ("edge_length", "status", "message")}
     rows = [_in_fitting_unit(row) for row in table_rows(data, present, SHAPE_COLUMNS, columns)]
     cited = (one for one in records(data, present, ["source"]) if one["source"])
     sources = dict.fromkeys(f"{one['shape']}, {one['quantity']}: {one['source']}" for one in cited)

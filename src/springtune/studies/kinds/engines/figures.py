@@ -15,10 +15,8 @@ FRAME_SECONDS = 1 / 60
 
 def engines(tree):
     """Yield the figures of a dataset: stem, plot function and selection."""
-    for name, stem, plot in (
-        ("engines", "errors", plot_engine_errors),
-        ("engine_curves", "curves", plot_engine_curves),
-    ):
+    plots = {"engines": ("errors", plot_engine_errors), "engine_curves": ("curves", plot_engine_curves)}
+    for name, (stem, plot) in plots.items():
         for scene in labels_of(group(tree, name).status != 0, "scene") if name in tree else ():
             yield f"engines_{stem}_{scene}", plot, {"scene": scene}
 

@@ -187,8 +187,7 @@ def maps(setup):
 
 def _behaviour(motion, integrator, step):
     start = _noise(motion)
-    count = 400 if integrator in EXPLICIT else 60
-    found = motion.run(integrator, step, count, start)
+    found = motion.run(integrator, step, 400 if integrator in EXPLICIT else 60, start)
     if found.status == "diverged":
         return BEHAVIOURS.index("nan")
     before, after = (np.linalg.norm(motion.missing(u) / motion.mass) for u in (start, found.displacements))
