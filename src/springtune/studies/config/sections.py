@@ -455,24 +455,12 @@ def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     for kind in kinds:
         alone += kind.alone or [name for name, (_, field) in kind.study_fields.items() if field.default is None]
     meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in made)
-    added["outputs"] = (
-        OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]],
-        Field(
-            [output.name for output in made if output.usual],
-            description=f"Figures and tables: {meanings}. "
-            "Figures of scenes show nonlinear kinematics if a grid has them.",
-        ),
-    )
-    listed = ", ".join(f"`{name}`" for name in alone)
-    added["grids"] = (
-        dict[str, grid],
-        Field(
-            {},
-            min_length=1,
-            title="a section for each grid, by name",
-            description=f"Grids of scenes. Optional with one of {listed}.",
-        ),
-    )
+    said = f"Figures and tables: {meanings}. Figures of scenes show nonlinear kinematics if a grid has them."
+    usual = Field([output.name for output in made if output.usual], description=said)
+    added["outputs"] = OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]], usual
+    said = f"Grids of scenes. Optional with one of {', '.join(f'`{name}`' for name in alone)}."
+    several = Field({}, min_length=1, title="a section for each grid, by name", description=said)
+    added["grids"] = dict[str, grid], several
     model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
     model.alone = alone
     model.model_config["json_schema_extra"] = {"anyOf": [{"required": [key]} for key in ("grids", *alone)]}
