@@ -48,7 +48,7 @@ def groups(study, folder):
     particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
     group, places = _coordinates(sample, drawn, study.axes)
     frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
-    frames += chain.from_iterable(_load_rows(load, sample, drawn, results, folder / "samples") for load in sample.loads)
+    frames += chain.from_iterable(_load_rows(load, sample, drawn, results, folder / "samples") for load in sample.load)
     data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
     data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type")}
     data.attrs |= {"kinematics": "linear", "varied": " ".join(sample.varied)}
@@ -60,7 +60,7 @@ def groups(study, folder):
 
 def _read_results(sample, folder):
     """Read the parameters of all rows, and displacement, status, particles and message of each row by result key."""
-    keys = sorted({result_key(sample, load, name) for load in sample.loads for name in sample.solved})
+    keys = sorted({result_key(sample, load, name) for load in sample.load for name in sample.solved})
     names = [*dict.fromkeys([*sample.drawn, "mesh_size"])]
     paths = [folder / f"{block_key(sample, *ends)}.h5" for ends in blocks(sample.design, sample.size)]
     read = [store.read(path, [DRAWN, *keys], [*names, "displacement", "status", "particles"]) for path in paths]
@@ -92,7 +92,7 @@ def _load_rows(load, sample, drawn, results, folder):
     }
     rows = {"sample": range(sample.rows), "load": load}
     yield pd.DataFrame(rows | values)
-    for name in sample.definitions:
+    for name in sample.definition:
         found = results[result_key(sample, load, name)]
         there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
         displacement = np.where(there, sign * found["displacement"], np.nan)
@@ -133,7 +133,7 @@ def _coordinates(sample, drawn, dimensions):
 
 def _quantities(sample, data):
     """Yield the labels of each quantity, load and definition, and values by row, NaN if not solved."""
-    for quantity, load, name in product(QUANTITIES, sample.loads, sample.definitions):
+    for quantity, load, name in product(QUANTITIES, sample.load, sample.definition):
         one = data[[quantity, "status"]].sel(load=load, definition=name)
         values = one[quantity].values
         if quantity != "best_stiffness":

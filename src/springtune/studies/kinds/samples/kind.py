@@ -163,29 +163,19 @@ class SamplesConfig(Section):
     mesh_type: fields.MadeType = default("structured")
     """Generated mesh type."""
 
-    load: OneOrMore[fields.Load]
+    load: Annotated[OneOrMore[fields.Load], AfterValidator(lambda names: sorted(names, key=[*LOADS].index))]
     """Loads of every scene."""
 
-    definition: fields.DefinitionNames
+    definition: Annotated[fields.DefinitionNames, AfterValidator(lambda names: sorted(names, key=[*DEFINITIONS].index))]
     """Definitions that derive a stiffness without a reference."""
 
     parameters: ParametersConfig
     """Parameters."""
 
     @property
-    def loads(self) -> list[str]:
-        """Loads in a canonical order."""
-        return [name for name in LOADS if name in self.load]
-
-    @property
-    def definitions(self) -> list[str]:
-        """Definitions in a canonical order."""
-        return [name for name in DEFINITIONS if name in self.definition]
-
-    @property
     def solved(self) -> list[str]:
         """Definitions whose networks are solved; uniform springs give the best stiffness."""
-        return list(dict.fromkeys([*self.definitions, UNIFORM]))
+        return list(dict.fromkeys([*self.definition, UNIFORM]))
 
     @property
     def drawn(self) -> dict[str, Drawn]:
@@ -300,7 +290,7 @@ def _reference_tasks(study):
     if sample.rows <= MOST_SOLVED_ROWS:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.drawn}
         drawn |= {"first": 0, "last": sample.size}
-    for kind in dict.fromkeys(LOADS[name].kind for name in sample.loads):
+    for kind in dict.fromkeys(LOADS[name].kind for name in sample.load):
         key, values = reference_key(sample, kind), {"kind": kind.name, "box": box}
         yield Task(values, seconds=1.0, name=kind.name, file=key, key=key, shared={"sample": drawn})
 
@@ -310,7 +300,7 @@ def _block_tasks(study):
     sample = study.parts["samples"]
     scenes = {
         result_key(sample, load, definition): {"kind": LOADS[load].kind.name, "definition": definition}
-        for load in sample.loads
+        for load in sample.load
         for definition in sample.solved
     }
     shared = {name: getattr(sample, name) for name in ("design", "seed", "mesh_type")}
@@ -336,7 +326,7 @@ def _lack(study):
 
 def _figures(study):
     sample = study.parts["samples"]
-    return {stem("sobol", {"load": load}): {"load": load} for load in sample.loads} if sample else {}
+    return {stem("sobol", {"load": load}): {"load": load} for load in sample.load} if sample else {}
 
 
 FIGURES = "studies.kinds.samples.figures"
@@ -346,7 +336,7 @@ KIND = StudyKind(
     study_fields={"samples": optional(SamplesConfig, "Sampled scenes: groups `/samples` and `/sobol`.")},
     check=_check,
     expand=_expand,
-    axes=lambda sample: {"load": set(sample.loads), "definition": set(sample.definitions)},
+    axes=lambda sample: {"load": set(sample.load), "definition": set(sample.definition)},
     summary=_summary,
     stages=(
         Stage("interpolate", INTERPOLATE, _reference_tasks, folder="samples"),
