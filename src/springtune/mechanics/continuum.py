@@ -11,12 +11,10 @@ r"""Networks as a continuum: effective moduli by patch tests with an even strain
              o-/   \-o  ->                body give its compliance
           <- o-\___/-o
 
-Moduli are times the thickness and over the reference stiffness [1]. They are those of the given mesh: rows of
-triangles fitted to a box are stretched and differ from the exact lattice (`springtune.mesh.lattice`) by a few
-percent.
+Moduli are times the thickness and over the reference stiffness [1], and of the given mesh: rows of triangles stretched
+to fit a box differ from the exact lattice (`springtune.mesh.lattice`) by a few percent.
 
-Stress is recovered from the forces in cells. A cell of area A in which forces f act on corners at x has the mean stress
-(virial)
+A cell of area A in which forces f act on corners at x has the mean stress (virial)
 
 .. math:: \sigma = \frac{1}{A t} \sum_{corners} x \otimes f
 

@@ -313,9 +313,8 @@ class StaticProblem(LoadedNetwork):
     def nonlinear(self, s: float) -> Equilibrium:
         """Return the equilibrium with the springs' full length law, on the path from rest.
 
-        Newton's method starts from the series about rest; if it fails, from the linear solution; then in load steps.
-        Load steps also replace solutions with springs stretched beyond `FAR_STRETCH` or turned beyond `FAR_CHANGE`, or
-        with an unstable point half-way from rest.
+        Newton's method starts from the series about rest; if it fails, from the linear solution. Load steps replace
+        what fails, what goes beyond `FAR_STRETCH` or `FAR_CHANGE`, and what has an unstable point half-way from rest.
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]

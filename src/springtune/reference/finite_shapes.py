@@ -67,14 +67,13 @@ class _Levels:
 
 
 class _PartLaws:
-    """Laws of elements, by the `names` of their materials; `scales` (elements,) are their units of stress [Pa]."""
+    """`Law` of elements by the `names` of their materials; `scales` (elements,) are their units of stress [Pa]."""
 
     def __init__(self, names: np.ndarray, laws: Mapping[str, tuple[float, Law]]) -> None:
         self.rows = [(names == name, laws[name][1]) for name in np.unique(names).tolist()]
         self.scales = np.array([laws[name][0] for name in names.tolist()])
 
     def response(self, strain: np.ndarray) -> Response:
-        """Evaluate the law of each part, see `Law`."""
         stress, tangent = np.empty(strain.shape), np.empty((*strain.shape, 3))
         for rows, law in self.rows:
             found = law.response(strain[rows])
@@ -82,7 +81,6 @@ class _PartLaws:
         return Response(stress, tangent)
 
     def energy(self, strain: np.ndarray) -> np.ndarray:
-        """Evaluate the law of each part, see `Law`."""
         total = np.empty(strain.shape[:-1])
         for rows, law in self.rows:
             total[rows] = law.energy(strain[rows])

@@ -233,9 +233,8 @@ class _Piece:
         one, other = (self.side.slope(parameter) for parameter in self.span)
         return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
 
-    def halves(self) -> "tuple[_Piece, _Piece]":
-        middle = sum(self.span) / 2
-        return replace(self, span=(self.span[0], middle)), replace(self, span=(middle, self.span[1]))
+    def cut(self, parameters: list[float]) -> "list[_Piece]":
+        return [replace(self, span=span) for span in zip(parameters, parameters[1:])]
 
 
 def _refine_pieces(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
@@ -256,10 +255,9 @@ def _refine_pieces(pieces: list[_Piece], extent: float, largest_turn: float) -> 
             nearest = apart[clear].min(initial=np.inf)
             others = (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf)
             limit = min(extent / LEAST_SIDES_ALONG, ELEMENT_GROWTH * nearest, others)
-            if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
-                refined += piece.halves()
-            else:
-                refined.append(piece)
+            kept = length <= 1.01 * limit and piece.turn <= 1.01 * largest_turn and sagitta <= LARGEST_SAGITTA * nearest
+            start, end = piece.span
+            refined += piece.cut([start, end] if kept else [start, (start + end) / 2, end])
         if len(refined) == len(pieces):
             return pieces
         pieces = refined
@@ -297,7 +295,7 @@ def outline_mesh(
     for piece in whole:
         cuts, on_it = _cut(piece.side, points, LENGTH_TOLERANCE * extent)
         placed.update(on_it)
-        pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
+        pieces += piece.cut(cuts)
     mesh = _triangulated(shape.name, _refine_pieces(pieces, extent, largest_turn), names, extent)
     for name, point in points.items():
         where = np.array(point, dtype=float)
