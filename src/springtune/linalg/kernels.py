@@ -98,19 +98,10 @@ def multiply(
 
 @compiled
 def advance(
-    first: int,
-    last: int,
-    matrix: Chunks,
-    length: float,
-    u: Field,
-    forces: Field,
-    solution: Field,
-    residual: Field,
-    scale: float,
-    right: Field,
-    squares: Field,
+    first: int, last: int, matrix: Chunks, length: float, fields: Any, scale: float, right: Field, squares: Field
 ) -> None:
     """Step along `u`, and set `right` to the new residual times a scale, `squares` to its squared norm by chunk."""
+    u, forces, solution, residual = fields
     for chunk in range(first, last):
         total = 0.0
         for i in range(matrix.starts[chunk], matrix.starts[chunk + 1]):

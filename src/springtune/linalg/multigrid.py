@@ -194,7 +194,8 @@ class Multigrid:
             missing -= forces
         direction, length, weight = np.zeros(missing.shape), 0.0, np.inf
         for count in range(MAX_CG_ITERATIONS + 1):
-            run(kernels.advance, self._product, length, direction, forces, solution, missing, scale, right, squares)
+            fields = direction, forces, solution, missing
+            run(kernels.advance, self._product, length, fields, scale, right, squares)
             if squares.sum() ** 0.5 <= tolerance * size:
                 self._certain |= proves
                 return solution

@@ -110,27 +110,7 @@ def _pull(
 
 @compiled
 def advance_springs(
-    thread: int,
-    pointers: np.ndarray,
-    first: np.ndarray,
-    second: np.ndarray,
-    rest: np.ndarray,
-    lengths: np.ndarray,
-    stiffness: np.ndarray,
-    dampers: np.ndarray,
-    gain: np.ndarray,
-    load: np.ndarray,
-    keep: float,
-    step: float,
-    size: int,
-    bandwidth: int,
-    force: np.ndarray,
-    room: np.ndarray,
-    u: np.ndarray,
-    v: np.ndarray,
-    steps: int,
-    depth: int,
-    progress: np.ndarray,
+    thread: int, network: Any, numbers: Any, u: np.ndarray, v: np.ndarray, steps: int, depth: int, progress: np.ndarray
 ) -> None:
     """Advance springs with their length law and a damper each, in the passes of a thread.
 
@@ -138,6 +118,8 @@ def advance_springs(
     perhaps empty; `rest` (2, n_springs); `gain` g, `load`, `force` at start and end (n_points, 2); `room` (4, most
     springs of a block) is scratch space; `u`, `v` (1, n_points, 2) the state [m, m/s]. `keep` is d [1].
     """
+    pointers, first, second, rest, lengths, stiffness, dampers, gain, load, force, room = network
+    keep, step, size, bandwidth = numbers
     u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
     ax, ay, bx, by = room[0], room[1], room[2], room[3]
     blocks, distance = _passes(count, size, depth, bandwidth)
@@ -183,24 +165,11 @@ def advance_springs(
 
 @compiled
 def advance_matrix(
-    thread: int,
-    pointers: np.ndarray,
-    indices: np.ndarray,
-    stiffness: np.ndarray,
-    dampers: np.ndarray,
-    gain: np.ndarray,
-    load: np.ndarray,
-    keep: float,
-    step: float,
-    size: int,
-    bandwidth: int,
-    u: np.ndarray,
-    v: np.ndarray,
-    steps: int,
-    depth: int,
-    progress: np.ndarray,
+    thread: int, network: Any, numbers: Any, u: np.ndarray, v: np.ndarray, steps: int, depth: int, progress: np.ndarray
 ) -> None:
     """Advance a linear network in the passes of a thread; `u` and, with dampers, `v` alternate between two states."""
+    pointers, indices, stiffness, dampers, gain, load = network
+    keep, step, size, bandwidth = numbers
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
     blocks, distance = _passes(count, size, depth, bandwidth)
     for number in range(thread, (steps + depth - 1) // depth, threads):

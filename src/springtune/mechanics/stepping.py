@@ -177,9 +177,9 @@ class _ExplicitSteps(Stepper):
         threads, size, self._depth = passes_of(pointers, bandwidth, 10 * number, 4 * number + 8, threads)
         most = int((pointers[size:] - pointers[:-size]).max(initial=0))
         force, index = load.copy(), (values.astype(np.uint32) for values in (pointers, first, second))
-        arrays = *index, *of_springs, gain, load, *self._numbers, size, bandwidth, force
+        arrays, sizes = (*index, *of_springs, gain, load, force), (*self._numbers, size, bandwidth)
         self.function = advance_springs
-        self._threads = [(*arrays, np.empty((4, most), dtype=self.kind)) for _ in range(threads)]
+        self._threads = [((*arrays, np.empty((4, most), dtype=self.kind)), sizes) for _ in range(threads)]
         self._as, self._back = lambda values: values[order], lambda values: values[place]
         self._states = 1, 1
 
@@ -200,7 +200,7 @@ class _ExplicitSteps(Stepper):
         bandwidth, number = int(np.abs(matrix.indices - rows).max(initial=1)), self.kind(0).nbytes
         threads, size, self._depth = passes_of(matrix.indptr, bandwidth, 6 * number, number + 4, threads)
         self.function = advance_matrix
-        self._threads = [(*arrays, *self._numbers, size, bandwidth)] * threads
+        self._threads = [(arrays, (*self._numbers, size, bandwidth))] * threads
         self._as = lambda values: network.reduce(values)[order]
         self._back = lambda values: network.expand(values[place])
         self._states = 2, 1 + (len(damping) > 0)
