@@ -459,7 +459,7 @@ def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     usual = Field([output.name for output in made if output.usual], description=said)
     added["outputs"] = OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]], usual
     said = f"Grids of scenes. Optional with one of {', '.join(f'`{name}`' for name in alone)}."
-    several = Field({}, min_length=1, title="a section for each grid, by name", description=said)
+    several: Any = Field({}, min_length=1, title="a section for each grid, by name", description=said)
     added["grids"] = dict[str, grid], several
     model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
     model.alone = alone
