@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce, wraps
@@ -93,14 +93,6 @@ FOR_ENGINE = ("density", "load", "force")
 """Options that an engine needs besides those of a beam."""
 
 
-def check_missing(given: dict[str, Any], needed: Iterable[str]) -> None:
-    """Refuse a beam with missing options; ValueError has a line for each of them."""
-    constants = None if None in (given["young"], given["poisson"]) else "of one's own"
-    there = given | {"material": given["material"] or constants}
-    if missing := [text for name, text in MISSING.items() if name in needed and there[name] is None]:
-        raise ValueError(*missing)
-
-
 # -- beams and shapes --------------------------------------------------------------------------------------------------
 
 
@@ -174,8 +166,11 @@ def read_body(
     """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size; a beam `also` more."""
     if given["study"]:
         return _read_shape_options(given, load, sized)
-    generated = sized and not Path(given["mesh"] or "").is_file()
-    check_missing(dict(given), ("beam", "material", *("size",) * generated, *also))
+    needed = {"beam", "material", *also, *(() if not sized or Path(given["mesh"] or "").is_file() else ("size",))}
+    constants = None if None in (given["young"], given["poisson"]) else "of one's own"
+    there = {**given, "material": given["material"] or constants}
+    if missing := [text for name, text in MISSING.items() if name in needed and there[name] is None]:
+        raise ValueError(*missing)  # each is a line
     return _read_beam_options(given, load, sized)
 
 

@@ -193,11 +193,9 @@ def _answer_for_engine(sheet: dict[str, Any], asked: dict[str, Any], loads: list
     body = options.read_body(sheet | {"load": load, "force": asked["force"]}, load, also=options.FOR_ENGINE)
     make = partial(Scene, body.body, body.mesh, body.material, str(body.load), asked["force"], scale=asked["scale"])
     if asked["definition"] is None:
-        scene, refused, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
+        scene, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
     else:
-        scene, refused, tried = make(definition=asked["definition"]), "", ()
-    if scene is None:
-        raise click.ClickException(refused)
+        scene, tried = make(definition=asked["definition"]), ()
     fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)
     none = partial(_refuse, f"there is no factor, so nothing is written: {fit.message}; give the setting above")
     return fit_text(fit, body.mesh_name, tried), fit.net if fit.factor == fit.factor else none

@@ -534,8 +534,8 @@ def _band(runs: _Runs, load: str, tuned: EngineResult) -> LoadBand:
 
 def best_runnable_scene(
     make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool
-) -> tuple[Scene | None, str, tuple[str, ...]]:
-    """Scene of the best definition that an engine runs, or None and the reason; and the definitions tried."""
+) -> tuple[Scene, tuple[str, ...]]:
+    """Scene of the best definition that an engine runs, and the definitions tried; EngineError without one."""
     body, mesh, material, load, *_ = make.args
     about: dict[str, Any] = {"load": load} if isinstance(body, Shape) else {"loads": loads}
     tried, refused = trial(body, mesh, material, **about), dict[str, str]()
@@ -543,8 +543,8 @@ def best_runnable_scene(
         able = [one for one in tried.choices(refused) if one.worst < np.inf and not (springs_alone and one.energies)]
         able.sort(key=lambda one: engine.springs_first and one.energies)
         if not able:
-            why = next(iter(refused.values()), "no definition has a stable network on this mesh; take another mesh")
-            return None, why, tried.tried
+            none = "no definition has a stable network on this mesh; take another mesh"
+            raise EngineError(next(iter(refused.values()), none))
         name = able[0].definition
         scene = make(definition=name)
         try:
@@ -552,6 +552,6 @@ def best_runnable_scene(
                 why = f"definition '{name}' moves across by {error_text(aside)}"
                 raise EngineError(f"{why}; take a finer mesh, or another type such as 'structured'")
             engine.start(net_of(scene), setting, 1.0)
-            return scene, "", tried.tried
+            return scene, tried.tried
         except EngineError as error:
             refused[name] = str(error)

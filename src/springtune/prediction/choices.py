@@ -300,9 +300,8 @@ def trial(
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
     under_loads = beam_problems(beam, mesh, material, loads)
-    named = [one.load for one in under_loads]
-    known = references(beam, under_loads[0].material, named) if known is None else known
-    return Trial(under_loads, {load: known[load] for load in named}, also=more)
+    known = known or references(beam, under_loads[0].material, [one.load for one in under_loads])
+    return Trial(under_loads, {one.load: known[one.load] for one in under_loads}, also=more)
 
 
 def beam_problems(

@@ -483,23 +483,20 @@ class _Search:
     def _promising(self, name: str) -> bool:
         """Whether a definition may keep the error on the finest mesh, if the error is proportional to the mesh size."""
         on, doubling = self._on(name), self._doubling(name)
-        if doubling is None or FINEST_CELLS_RATIO * REGULAR_FROM_CELLS > on[-1].cells:
+        if not doubling or FINEST_CELLS_RATIO * REGULAR_FROM_CELLS > on[-1].cells:
             return bool(on)
         left = EXTRAPOLATION_MARGIN * (1 - on[-1].cells / self._finest)
-        before, last = doubling
-        if any(before[load] != before[load] and last[load] != last[load] for load in last):
+        if any(before != before and last != last for before, last in doubling):
             return False
-        return not any(abs(last[load]) - left * abs(last[load] - before[load]) > self._error for load in last)
+        return not any(abs(last) - left * abs(last - before) > self._error for before, last in doubling)
 
     def _steady(self, name: str) -> bool:
         """Whether a definition would keep the error if it changed once more by as much as over the last doubling."""
-        if not (doubling := self._doubling(name)):
-            return False
-        before, last = doubling
-        return all(abs(2 * last[load] - before[load]) <= self._error for load in last)
+        doubling = self._doubling(name)
+        return bool(doubling) and all(abs(2 * last - before) <= self._error for before, last in doubling)
 
-    def _doubling(self, name: str) -> tuple[dict[str, float], dict[str, float]] | None:
-        """Errors on a mesh of half as many cells across as the finest one that was tried, or fewer, and on that."""
-        on = self._on(name)
-        coarser = [one for one in on if FINEST_CELLS_RATIO * one.cells <= on[-1].cells]
-        return (coarser[-1].errors[name], on[-1].errors[name]) if coarser else None
+    def _doubling(self, name: str) -> list[tuple[float, float]]:
+        """Errors on a mesh of half as many cells across as the finest one, or fewer, and on that; [] without one."""
+        on = [(one.cells, one.errors[name]) for one in self._on(name)]
+        coarser = [errors for cells, errors in on if FINEST_CELLS_RATIO * cells <= on[-1][0]]
+        return [(coarser[-1][load], error) for load, error in on[-1][1].items()] if coarser else []
