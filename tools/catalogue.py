@@ -19,7 +19,7 @@ from springtune.handover.simulation import ENERGY_WORDS, terms_of
 from springtune.linalg.factors import SingularError
 from springtune.mesh.rows import lattice
 from springtune.mesh.sheets import bonded
-from springtune.safe_io.files import write_text
+from springtune.safe_io import write_text
 from springtune.springs import DEFINITIONS, Definition, Springs
 from springtune.springs.calibrated import calibrate
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import get_args, get_origin
 
-from springtune.safe_io.files import write_text
+from springtune.safe_io import write_text
 from springtune.studies.config.fields import Section
 from springtune.studies.config.messages import words
 

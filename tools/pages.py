@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from springtune.safe_io.files import write_text
+from springtune.safe_io import write_text
 from springtune.studies.output import reading
 
 REPOSITORY = Path(__file__).parents[1]

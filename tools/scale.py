@@ -104,7 +104,7 @@ def plan_and_note(config: str) -> None:
 
 def do_stages(config: str, invent: str) -> None:
     """Do the jobs of a study's stages; results of scenes are invented where that is said."""
-    from springtune.safe_io.files import write_json
+    from springtune.safe_io import write_json
     from springtune.studies.runs import job
 
     folder = Path("results") / Path(config).stem

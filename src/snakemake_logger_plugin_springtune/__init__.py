@@ -13,7 +13,7 @@ from typing import TextIO
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from springtune.safe_io.texts import clock as clock_text
+from springtune.safe_io import clock as clock_text
 
 PAUSE = 0.5
 """Time between two updates of the moving line [s]."""

@@ -14,7 +14,7 @@ from springtune.mesh.cells import quality, signed_areas
 from springtune.mesh.formats import read_beam_mesh, read_mesh, write_mesh
 from springtune.mesh.free import free
 from springtune.mesh.rows import braced, isosceles, lattice, structured
-from springtune.safe_io.files import virtual_memory
+from springtune.safe_io import virtual_memory
 from springtune.studies.kinds.bodies.mesh import make
 
 from tables import cases

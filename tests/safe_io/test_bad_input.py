@@ -24,7 +24,7 @@ import springtune as st
 from springtune.cli import main
 from springtune.mesh.formats import read_beam_mesh, read_shape, write_mesh
 from springtune.mesh.rows import braced, lattice, right
-from springtune.safe_io.files import ABANDONED_SECONDS, remove_unfinished, replacing, write_text
+from springtune.safe_io import ABANDONED_SECONDS, remove_unfinished, replacing, write_text
 from springtune.studies.output.browse import page
 from springtune.studies.output.dataset import write
 
@@ -42,7 +42,7 @@ def sizes(count):
 
 STUDIES = {
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
-    "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
+    "a large file": (SMALL + "#" * 500_000, "larger than 0.5 MB"),
     "aliases of aliases": (
         "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)),
         "study.yaml:1: more than 100000 values, aliases (*name) as what they stand for; give",

@@ -16,8 +16,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 from springtune.problem.shapes import AssumptionWarning
-from springtune.safe_io.files import remove_unfinished, reset_future_times
-from springtune.safe_io.texts import rst
+from springtune.safe_io import remove_unfinished, reset_future_times, rst
 from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study

@@ -13,7 +13,7 @@ import click
 
 from .. import __version__
 from ..registry import import_name
-from ..safe_io.texts import UNSEEN, shown
+from ..safe_io import UNSEEN, shown
 from ..studies.runs.source import is_source_tree
 
 

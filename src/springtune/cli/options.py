@@ -14,8 +14,7 @@ from click.core import ParameterSource
 
 from ..problem.quantities import PLANES, nearest, positive
 from ..problem.shapes import Beam
-from ..safe_io.files import number_of
-from ..safe_io.texts import mesh_size_text
+from ..safe_io import mesh_size_text, number_of
 from ..studies.runs.source import is_source_tree
 
 if TYPE_CHECKING:

@@ -304,7 +304,7 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     """Options of each test of a file: one test of a CSV file, the list in a YAML file."""
     from yaml import YAMLError, safe_load
 
-    from ..safe_io.files import LARGEST_CSV, read
+    from ..safe_io import LARGEST_CSV, read
 
     if path.suffix not in (".yaml", ".yml"):
         return [{"file": path}]

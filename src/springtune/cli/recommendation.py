@@ -9,7 +9,7 @@ import numpy as np
 
 from ..problem.compare import error_text, sign_sentence, sign_word
 from ..problem.shapes import QUANTITY_UNITS, size_text
-from ..safe_io.texts import TabledList, aligned, mesh_size_text
+from ..safe_io import TabledList, aligned, mesh_size_text
 
 if TYPE_CHECKING:
     from ..engines.calibration import EngineFit

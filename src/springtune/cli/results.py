@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..registry import how_to_install
-from ..safe_io.texts import aligned, clipped, shown
+from ..safe_io import aligned, clipped, shown
 from ..studies.output.text import bytes_text, cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER, workflow_folder
 from . import PATH, WrongCall, command

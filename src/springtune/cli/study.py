@@ -16,8 +16,7 @@ import click
 
 from ..problem.quantities import nearest
 from ..registry import NAME, NAME_RULE, how_to_install
-from ..safe_io.files import write_bytes, write_text
-from ..safe_io.texts import aligned
+from ..safe_io import aligned, write_bytes, write_text
 from ..studies.runs.source import CONFIG_FOLDER, TASKS, USUAL_STUDY, config_file, is_source_tree, workflow_folder
 from . import PATH, WrongCall, command
 

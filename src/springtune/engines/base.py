@@ -22,7 +22,7 @@ from ..mechanics import PRECISIONS
 from ..mechanics.energies import Energy
 from ..problem.quantities import positive, put
 from ..registry import Declaration, Registry, how_to_install
-from ..safe_io.texts import number_text
+from ..safe_io import number_text
 
 MOST_STEPS, LONGEST_FRAME = 100_000, 1.0
 """Most substeps and iterations, and the longest frame [s]."""

@@ -19,7 +19,7 @@ from ..problem.compare import error_text
 from ..problem.loads import LOADS
 from ..problem.shapes import Shape
 from ..reference.small_strain import ReferenceNotConvergedError
-from ..safe_io.texts import Tabled, TabledList, number_text
+from ..safe_io import Tabled, TabledList, number_text
 from ..scene.boundary_problem import ShapeProblem, unit_reference
 from ..scene.single import Scene
 from .base import ENGINES, Engine, EngineError, Setting

@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..mesh.formats import MOST_MESSAGE_CHARACTERS
-from ..safe_io.files import check_folder, replacing, write_text
-from ..safe_io.texts import json_line, shown
+from ..safe_io import check_folder, json_line, replacing, shown, write_text
 from ..scene.single import Scene
 from ..springs.base import Springs
 from .mujoco import mjcf

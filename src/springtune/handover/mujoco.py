@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..safe_io.texts import printable
+from ..safe_io import printable
 from .simulation import Net, Simulation, Terms, comment_lines, fill_template, lame, load_in_words, numbers, simulate
 
 LEAST_MASS = 1e-15

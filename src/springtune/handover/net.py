@@ -22,7 +22,7 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
 from ..problem.shapes import Beam
 from ..registry import hook
-from ..safe_io.texts import Tabled
+from ..safe_io import Tabled
 from ..scene.boundary_problem import BeamProblem, ShapeProblem, check_filled
 from ..scene.mesh_cache import (
     A_BEAM,

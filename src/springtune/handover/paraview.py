@@ -7,8 +7,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..mesh.formats import library
-from ..safe_io.files import replacing
-from ..safe_io.texts import shown
+from ..safe_io import replacing, shown
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
 """meshio's names of cells by their corners."""

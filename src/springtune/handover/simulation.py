@@ -16,7 +16,7 @@ from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh.cells import Mesh, corner_angles, no_cells, rows_of, signed_areas
 from ..problem.quantities import Status
-from ..safe_io.texts import printable, xml_comment
+from ..safe_io import printable, xml_comment
 from ..springs.base import DefinitionError
 
 FORMULAS = {

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import eigsh
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
 from ..mesh.sheets import free_motion
-from ..safe_io.texts import Tabled
+from ..safe_io import Tabled
 from . import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..registry import NAME, NAME_RULE
-from ..safe_io.files import DataElsewhere, bounded, check_alone, check_folder, replacing, why_unreadable
+from ..safe_io import DataElsewhere, bounded, check_alone, check_folder, replacing, why_unreadable
 from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas, upright
 from .sheets import COORDINATE_TOLERANCE, Content, GroupedMesh, box_fault, on_sides, outline_of, part_names, sheet_fault

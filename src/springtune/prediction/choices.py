@@ -18,7 +18,7 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import Status, nearest
 from ..problem.shapes import Beam, Shape
 from ..reference.small_strain import ReferenceNotConvergedError
-from ..safe_io.texts import Tabled, TabledList
+from ..safe_io import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
 from ..scene.mesh_cache import A_BEAM, MeshCache, choose, is_a
 from ..scene.motion import stable_steps

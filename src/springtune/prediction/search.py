@@ -18,8 +18,7 @@ from ..problem.compare import error_text
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import quantity
 from ..problem.shapes import Beam, Shape
-from ..safe_io.files import number_of
-from ..safe_io.texts import Tabled, mesh_size_text
+from ..safe_io import Tabled, mesh_size_text, number_of
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
 from ..scene.mesh_cache import A_MATERIAL, is_a
 from . import choices

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..safe_io.files import csv_rows, numbers
+from ..safe_io import csv_rows, numbers
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
 from .quantities import Number, positive, put
 

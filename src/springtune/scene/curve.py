@@ -12,7 +12,7 @@ from ..problem.compare import Best, best_stiffness, deformation_error, error_tex
 from ..problem.loads import LoadKind
 from ..problem.quantities import Status
 from ..registry import hook
-from ..safe_io.texts import Tabled
+from ..safe_io import Tabled
 from ..springs.base import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .mesh_cache import MeshCache

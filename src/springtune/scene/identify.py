@@ -22,8 +22,7 @@ from ..problem.rubber import TestDataError
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
-from ..safe_io.files import number_of
-from ..safe_io.texts import Tabled
+from ..safe_io import Tabled, number_of
 from .measured import Block, MeasuredTest, blocks, body_of_test
 from .mesh_cache import choose, is_a
 

@@ -15,7 +15,7 @@ from ..problem.quantities import Number, nearest, positive, put, quantity
 from ..problem.rubber import TestDataError
 from ..problem.shapes import Beam, LoadCase, Segment, Shape
 from ..reference.by_constants import Family
-from ..safe_io.files import csv_rows, number_of, numbers
+from ..safe_io import csv_rows, number_of, numbers
 from .mesh_cache import A_BEAM, choose, is_a
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")

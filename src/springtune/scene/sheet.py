@@ -12,7 +12,7 @@ from ..mesh.cells import Mesh
 from ..mesh.sheets import bonded
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
-from ..safe_io.texts import Tabled
+from ..safe_io import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
 from .mesh_cache import A_MATERIAL, A_MESH, AnyDefinition, MeshCache, choose, definition_of, is_a, naming_errors

@@ -21,7 +21,7 @@ from ..problem.materials import AnyMaterial
 from ..problem.quantities import Status, positive
 from ..problem.shapes import QUANTITY_UNITS, AssumptionWarning, Beam, Shape
 from ..registry import hook
-from ..safe_io.texts import Tabled, number_text
+from ..safe_io import Tabled, number_text
 from ..springs.base import Springs
 from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
 from .mesh_cache import AnyDefinition, MeshCache, check_stiffness, definition_of, naming_errors

@@ -6,8 +6,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from springtune.safe_io.files import replacing
-from springtune.safe_io.texts import shown
+from springtune.safe_io import replacing, shown
 
 from .config.model import Study
 from .output import reading

@@ -15,7 +15,7 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 
 import springtune as st
 from snakemake_logger_plugin_springtune import Display, LogHandler
-from springtune.safe_io.files import write_json
+from springtune.safe_io import write_json
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.output import summary, summing_up
 from springtune.studies.runs import plan

@@ -16,7 +16,7 @@ from springtune.problem.materials import AnyMaterial, Material, Rubber, only_iso
 from springtune.problem.quantities import SWEPT, nearest
 from springtune.problem.shapes import Beam
 from springtune.registry import NAME, NAME_RULE
-from springtune.safe_io.files import Rows, csv_rows, why_unreadable
+from springtune.safe_io import Rows, csv_rows, why_unreadable
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 

@@ -12,8 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from springtune.problem.quantities import nearest
-from springtune.safe_io.files import BeyondSize, read
-from springtune.safe_io.texts import UNSEEN, clipped, shown
+from springtune.safe_io import UNSEEN, BeyondSize, clipped, read, shown
 
 Model = TypeVar("Model", bound=BaseModel)
 

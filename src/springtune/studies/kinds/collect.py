@@ -7,7 +7,7 @@ from pathlib import Path
 import xarray as xr
 
 from springtune.registry import import_name
-from springtune.safe_io.files import write_json, write_text
+from springtune.safe_io import write_json, write_text
 
 from ..config.kind import StudyKind, kinds, outputs
 from ..config.model import Study

@@ -26,7 +26,7 @@ from markupsafe import Markup
 
 from springtune.problem.compare import error_text
 from springtune.problem.quantities import Status
-from springtune.safe_io.files import write_json, write_text
+from springtune.safe_io import write_json, write_text
 
 from ..config.kind import VIEWS, kind_files
 from . import answers, reading

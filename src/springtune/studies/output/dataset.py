@@ -20,7 +20,7 @@ from xarray.conventions import cf_encoder, encode_dataset_coordinates
 
 from springtune.problem.quantities import OF_BODIES, SWEPT, Status, shown_order
 from springtune.problem.shapes import beam_label
-from springtune.safe_io.files import replacing
+from springtune.safe_io import replacing
 
 from ..config.kind import EMPTY_VALUES
 from ..config.model import STRAINED_REFERENCE

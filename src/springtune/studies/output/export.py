@@ -14,7 +14,7 @@ import xarray as xr
 
 from springtune.handover.paraview import write_vtu
 from springtune.problem.quantities import Status, nearest
-from springtune.safe_io.files import check_folder, replacing, write_text
+from springtune.safe_io import check_folder, replacing, write_text
 
 from ...registry import how_to_install
 from . import reading

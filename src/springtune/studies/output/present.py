@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from springtune.registry import import_name
-from springtune.safe_io.files import write_bytes, write_json, write_text
+from springtune.safe_io import write_bytes, write_json, write_text
 
 from ..config.kind import modules, outputs
 from . import reading

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.registry import NAME, NAME_RULE
-from springtune.safe_io.files import BeyondBound, DataElsewhere, bounded, check_alone
-from springtune.safe_io.texts import clipped
+from springtune.safe_io import BeyondBound, DataElsewhere, bounded, check_alone, clipped
 
 if TYPE_CHECKING:
     import h5netcdf

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from springtune.safe_io.texts import aligned, clock
+from springtune.safe_io import aligned, clock
 
 from ..runs.plan import DATASET, PAGE, PAPER_FILE, SUMMARY, Job
 from ..runs.source import RECORDS, read_note

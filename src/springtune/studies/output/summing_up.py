@@ -10,7 +10,7 @@ import xarray as xr
 
 from springtune.problem.compare import sign_word
 from springtune.problem.quantities import Status
-from springtune.safe_io.texts import aligned, shown
+from springtune.safe_io import aligned, shown
 
 from . import reading
 from .answers import Columns, Variables, definition_errors, own_laws, requested_cells, what_to_type

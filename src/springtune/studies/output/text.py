@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from springtune.problem.quantities import SWEPT, with_unit
-from springtune.safe_io.texts import number_text, shown
+from springtune.safe_io import number_text, shown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from springtune.safe_io.files import write_bytes, write_json
+from springtune.safe_io import write_bytes, write_json
 
 from ..output.text import cell_text
 from . import PaperError, check_typst, numbers

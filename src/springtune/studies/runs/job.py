@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from springtune.problem.shapes import AssumptionWarning
-from springtune.safe_io.files import write_json
+from springtune.safe_io import write_json
 
 from .attempts import do_in_worker
 from .source import PACKAGE, RECORDS, STATE, TASKS, hash_of, read_note, source_state

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TextIO
 
-from springtune.safe_io.files import write_json
+from springtune.safe_io import write_json
 
 from .source import TASKS
 

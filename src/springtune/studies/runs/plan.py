@@ -12,7 +12,7 @@ from math import log2
 from pathlib import Path
 from typing import Any
 
-from springtune.safe_io.files import write_bytes
+from springtune.safe_io import write_bytes
 
 from ..config.kind import FORMATS, VIEWS, Output, Stage, kind_files, kinds, modules, outputs
 from ..config.model import Study

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from springtune.safe_io.files import write_bytes
+from springtune.safe_io import write_bytes
 
 if TYPE_CHECKING:
     import h5py

@@ -16,7 +16,7 @@ import numpy as np
 from springtune.problem.loads import LOADS
 from springtune.problem.shapes import size_text
 from springtune.reference.answers import unit_problem, unit_scales
-from springtune.safe_io.texts import aligned
+from springtune.safe_io import aligned
 from springtune.springs.base import DEFINITIONS
 
 from ...config.kind import Stage, StudyKind

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
-from springtune.safe_io.texts import no_mathematics
+from springtune.safe_io import no_mathematics
 
 from ...output import drawing, style
 from ...output.dataset import STATUS, cells, choose, group, labels_of

@@ -29,7 +29,7 @@ from springtune.problem.shapes import (
     Traction,
     size_text,
 )
-from springtune.safe_io.files import why_unreadable
+from springtune.safe_io import why_unreadable
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields

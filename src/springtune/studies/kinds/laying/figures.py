@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from springtune.safe_io.texts import no_mathematics
+from springtune.safe_io import no_mathematics
 
 from ...output import style
 from ...output.dataset import cells, choose, group, labels_of, table_rows

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from springtune.safe_io.texts import no_mathematics
+from springtune.safe_io import no_mathematics
 
 from ...output import style
 from ...output.dataset import choose, group, labelled_beam, labels_of, most_requested, sign_of_errors, unswept

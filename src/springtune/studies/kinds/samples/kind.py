@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAda
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import MOST_SCENES
 from springtune.problem.shapes import warn_of_body
-from springtune.safe_io.texts import number_text
+from springtune.safe_io import number_text
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.colors import ListedColormap
 
-from springtune.safe_io.texts import no_mathematics
+from springtune.safe_io import no_mathematics
 
 from ...output import style
 from ...output.dataset import STATUS, group, labels_of, table_rows
