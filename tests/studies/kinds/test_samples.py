@@ -14,9 +14,9 @@ import springtune as st
 from springtune.reference.answers import unit_scales
 from springtune.reference.small_strain import solve_unit
 from springtune.scene.mesh_cache import MeshCache
-from springtune.studies.kinds.samples import designs, solve
+from springtune.studies.kinds import samples as designs
+from springtune.studies.kinds.samples import DESIGNS, blocks, solve
 from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
-from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.kind import MOST_SOLVED_ROWS
 from springtune.studies.runs import store
 from springtune.studies.runs.attempts import Attempts

@@ -17,7 +17,7 @@ from springtune.problem.quantities import Status
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
-from springtune.studies.kinds.samples.designs import PARAMETERS
+from springtune.studies.kinds.samples import PARAMETERS
 from springtune.studies.output.browse import packed, page, views
 
 from synthetic import dataset

@@ -17,8 +17,7 @@ from ...config.kind import declared_variables
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
-from . import QUANTITIES, problem_key
-from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
+from . import PARAMETERS, SOBOL_INDICES, blocks, problem_key, roles
 from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
@@ -28,6 +27,9 @@ SAMPLES = Group(
     dimensions={"sample": "row of the design"},
     further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
 )
+
+QUANTITIES = "displacement", "deformation_error", "best_stiffness"
+"""Quantities with Sobol indices."""
 
 ORDERS, ENDS = ("first", "total"), ("", "_low", "_high")
 """Orders of Sobol indices, and the ends of their bootstrap bands."""
@@ -43,7 +45,7 @@ def groups(study, folder):
     """Build the groups of a dataset."""
     sample = study.parts["samples"]
     drawn, results = _read_results(sample, folder / "samples")
-    axes = study.axes | {"sample": tuple(range(sample.rows)), "parameter": sample.varied, "quantity": tuple(QUANTITIES)}
+    axes = study.axes | {"sample": tuple(range(sample.rows)), "parameter": sample.varied, "quantity": QUANTITIES}
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
     group, places = _coordinates(sample, drawn, study.axes)

@@ -4,7 +4,6 @@ import numpy as np
 
 from ...output import style
 from ...output.dataset import choose, group, labels_of
-from . import QUANTITIES
 
 PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": "Young's modulus"}
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
@@ -110,10 +109,9 @@ def tables(tree):
     frame = frame[frame.base_samples > 0]
     frame["definition"] = frame["definition"].mask(frame["quantity"] == "best_stiffness", "")  # one of all definitions
     rows = frame.drop_duplicates(labels).to_dict("records")
-    first, second, third = QUANTITIES.values()
     note = (
-        f"{first.capitalize()}, {second} and {third}: shares of their variance by each parameter alone (first order) "
-        f"and in all that it takes part in (total order). Bands: {found.attrs['bands']}. "
-        f"Failures: {found.attrs['failures']}."
+        "Displacement of the network, deformation error and uniform stiffness without an error: shares of their "
+        "variance by each parameter alone (first order) and in all that it takes part in (total order). "
+        f"Bands: {found.attrs['bands']}. Failures: {found.attrs['failures']}."
     )
     return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": rows}]

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from ..bodies.reference import make_interpolant
-from . import problem_key
-from .designs import draw
+from . import draw, problem_key
 
 
 def run(content, attempts):

@@ -20,7 +20,7 @@ from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import hash_of
 from ..bodies.kind import REFERENCES_OF_SHAPES
-from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
+from . import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
 
 SHAPE_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
 """Keys of each distribution besides `from` and `to`."""
@@ -264,13 +264,13 @@ def reference_box(sample):
 
 def reference_key(sample, kind):
     """Key of the interpolated references of a kind of load."""
-    other = *REFERENCES_OF_SHAPES, "reference.finite_strain", "studies.kinds.samples.designs"
+    other = *REFERENCES_OF_SHAPES, "reference.finite_strain", "studies.kinds.samples"
     return hash_of(kind.name, reference_box(sample), stage_key(INTERPOLATE, without=other))
 
 
 def block_key(sample, first, last):
     """Key of the parameters of some base samples; it names the file of their results."""
-    return hash_of(sample.design, sample.seed, sample.drawn, first, last, stage_key("studies.kinds.samples.designs"))
+    return hash_of(sample.design, sample.seed, sample.drawn, first, last, stage_key("studies.kinds.samples"))
 
 
 @cache

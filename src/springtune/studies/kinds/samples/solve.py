@@ -17,7 +17,7 @@ from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
 from ...runs import store
-from .designs import draw
+from . import draw
 
 DRAWN = "drawn"
 """Key of the drawn parameters among the results of a task."""
