@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-HOOKS = {"drawing": "studies.output.drawing", "files": "handover.formats"}
+HOOKS = {"drawing": "studies.output.style", "files": "handover.formats"}
 """Modules that others call by name, mostly those of upper rooms: grimp counts an import inside a function, so that the
 import linter would find circles, and a new figure would change the keys of results."""
 

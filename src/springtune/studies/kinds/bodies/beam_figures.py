@@ -24,8 +24,7 @@ from ...output.dataset import (
     shown_swept,
     sign_of_errors,
 )
-from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, plane_vectors
-from ...output.style import status_words
+from ...output.style import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, plane_vectors, status_words
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .tables import like_with_like
 

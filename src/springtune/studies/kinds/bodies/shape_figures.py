@@ -5,7 +5,7 @@ from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io import no_mathematics
 
-from ...output import drawing, style
+from ...output import style
 from ...output.dataset import STATUS, cells, choose, group, labels_of
 from .outputs import ERRORS_STEM, shape_figures
 
@@ -197,19 +197,19 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     known = {name for row in rows.values() for name in row}
     names = [name for name in (*whole.definition.values.tolist(), REFERENCE_COLUMN) if name in known]
     errors = np.array([[row.get(name, np.nan) for name in names] for row in rows.values()]).reshape(len(rows), -1)
-    texts = [[drawing.NOT_ASKED if name not in row else
-              drawing.error_text(row[name], "") if np.isfinite(row[name]) else drawing.NO_RESULT
+    texts = [[style.NOT_ASKED if name not in row else
+              style.error_text(row[name], "") if np.isfinite(row[name]) else style.NO_RESULT
               for name in names] for row in rows.values()]  # fmt: skip
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
     if not np.isfinite(errors).any():
         style.write_reason(panel, "No quantity has an error: see status and message.")
         return panel
-    drawing.heat_map(panel, errors, np.array(texts, dtype=object))
+    style.heat_map(panel, errors, np.array(texts, dtype=object))
     panel.set_yticks(range(len(rows)), list(map(no_mathematics, rows)))
     panel.set_xticks(range(len(names)), list(map(no_mathematics, names)), rotation=90)
     panel.tick_params(length=0)
-    said = {drawing.NO_RESULT: "no result that counts", drawing.NOT_ASKED: "not asked for"}
+    said = {style.NO_RESULT: "no result that counts", style.NOT_ASKED: "not asked for"}
     panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if any(mark in row for row in texts)))
     return panel
 
@@ -285,13 +285,13 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    places = np.concatenate([drawing.plane_vectors(case, "{}"), drawing.plane_vectors(case, "outline_{}")])
-    width, height = drawing.extent(places, (1.0, 1.0))
+    places = np.concatenate([style.plane_vectors(case, "{}"), style.plane_vectors(case, "outline_{}")])
+    width, height = style.extent(places, (1.0, 1.0))
     columns = min(NETWORKS_IN_ROW, len(wanted))
     wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
     tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
     networks = case.reindex(definition=wanted)
-    scale, most = drawing.magnification(networks), _largest_force(networks)
+    scale, most = style.magnification(networks), _largest_force(networks)
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
@@ -328,7 +328,7 @@ def _largest_force(networks):
 
 def _draw_network(panel, one, state, scale, most):
     """Draw one network; return notes."""
-    lines = drawing.draw_network(panel, one, scale, most, FORCE_COLOURS)
+    lines = style.draw_network(panel, one, scale, most, FORCE_COLOURS)
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
     notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []

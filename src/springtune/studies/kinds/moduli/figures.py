@@ -7,7 +7,7 @@ from springtune.safe_io import no_mathematics
 
 from ...output import style
 from ...output.dataset import choose, group, labelled_beam, labels_of, most_requested, sign_of_errors, unswept
-from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
+from ...output.style import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 
 
 def definitions(tree):
