@@ -31,7 +31,7 @@ _NAMES = {
     "mesh.cells": ("MESH_TYPES", "Mesh", "MeshError", "mesh_type"),
     "mesh.sheets": ("GroupedMesh",),
     "studies.output.reading": ("field", "open"),
-    "studies.output.summing_up": ("info",),
+    "studies.output.summary": ("info",),
     "prediction.choices": ("Choice", "predict"),
     "prediction.search": ("MeshChoice", "MeshSearch", "SolvedMesh", "find_mesh"),
     "problem.loads": ("LOADS",),

@@ -79,7 +79,7 @@ from .studies.kinds.stability.figures import plot_stability_maps as plot_stabili
 from .studies.kinds.stability.figures import plot_stability_strains as plot_stability_strains
 from .studies.output.reading import field as field
 from .studies.output.reading import open as open
-from .studies.output.summing_up import info as info
+from .studies.output.summary import info as info
 from .units import UnitError as UnitError
 
 __all__: list[str]

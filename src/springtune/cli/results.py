@@ -31,7 +31,7 @@ def info(path: Path, study: bool) -> None:
 
     PATH is results/<study>, or its dataset.nc.
     """
-    from ..studies.output import reading, summing_up
+    from ..studies.output import reading, summary
 
     if study:
         with reading.open(path) as tree:
@@ -39,7 +39,7 @@ def info(path: Path, study: bool) -> None:
                 raise click.ClickException(f"{path}: has no attribute 'config'; springtune did not write it")
             click.echo(tree.attrs["config"], nl=False)
         return
-    click.echo(summing_up.info(path))
+    click.echo(summary.info(path))
 
 
 @command(

@@ -17,7 +17,7 @@ import springtune as st
 from snakemake_logger_plugin_springtune import Display, LogHandler
 from springtune.safe_io import write_json
 from springtune.studies.kinds.bodies.collect import ROOT
-from springtune.studies.output import summary, summing_up
+from springtune.studies.output import summary
 from springtune.studies.runs import plan
 
 from tables import STUDIES, beside, cases
@@ -43,7 +43,7 @@ def root(rows):
 
 def told(root):
     """Summary of a dataset of scenes alone."""
-    return summing_up.text({"/": root}, "A study")
+    return summary.text({"/": root}, "A study")
 
 
 class TestText:

@@ -11,7 +11,7 @@ from springtune.safe_io import write_json, write_text
 
 from ..config.kind import StudyKind, kinds, outputs
 from ..config.model import Study
-from ..output import dataset, summing_up
+from ..output import dataset, summary
 from ..runs import job, plan, provenance
 from ..runs.store import DamagedError
 from . import load_study
@@ -27,7 +27,7 @@ def run(study: Study, folder: Path, output: Path) -> None:
         raise SystemExit(str(error)) from None
     except OSError as error:
         raise SystemExit(str(error)) from None
-    write_text(output.with_name(plan.SUMMARY), summing_up.text(groups, study.title))
+    write_text(output.with_name(plan.SUMMARY), summary.text(groups, study.title))
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:

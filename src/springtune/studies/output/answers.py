@@ -1,7 +1,7 @@
 """Answers of a study: errors of definitions, what to type, and how errors are shown. By numpy alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,11 +10,19 @@ from springtune.problem.quantities import Status
 
 from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Variables = Mapping[str, tuple[Sequence[str], np.ndarray]]
 """Dimensions and values of a group's variables and labels."""
 
 Columns = dict[str, np.ndarray]
 """Labels and values of cells, arrays of one dimension."""
+
+
+def variables(data: "xr.Dataset") -> Variables:
+    """Dimensions and values of a group's variables and labels."""
+    return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
 
 
 def broadcast(dims: Sequence[str], own: Sequence[str], values: np.ndarray) -> np.ndarray:

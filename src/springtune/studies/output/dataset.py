@@ -24,7 +24,7 @@ from springtune.safe_io import replacing
 
 from ..config.kind import EMPTY_VALUES
 from ..config.model import STRAINED_REFERENCE
-from .answers import Variables, own_law, own_laws, sign_of_displacements
+from .answers import own_law, own_laws, sign_of_displacements, variables
 
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
@@ -466,11 +466,6 @@ def network(data: xr.DataTree, labels: dict[str, Label]) -> xr.Dataset:
 
 
 # -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's in its plane ---------
-
-
-def variables(data: xr.Dataset) -> Variables:
-    """Dimensions and values of a group's variables and labels."""
-    return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
 
 
 def in_own_plane(data: xr.Dataset) -> xr.Dataset:

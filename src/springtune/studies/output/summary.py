@@ -1,20 +1,249 @@
-"""Report at the end of a run, around the stored summary of the dataset, see `summing_up.text`."""
+"""Dataset as text, for `collect` and `info`: solved cells, failures with reasons, errors, origin; report of a run."""
 
 import os
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from springtune.safe_io import aligned, clock
+import numpy as np
+
+from springtune.problem.compare import sign_word
+from springtune.problem.quantities import Status
+from springtune.safe_io import aligned, clock, shown
 
 from ..runs.plan import DATASET, PAGE, PAPER_FILE, SUMMARY, Job
 from ..runs.source import RECORDS, read_note
-from .text import NOT_ALL_SOLVED
+from . import reading
+from .answers import Columns, Variables, definition_errors, own_laws, requested_cells, variables, what_to_type
+from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, place_text, range_text, without_numbers
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..config.model import Study
+
+CELLS_NAMED = 3
+"""Cells named for each status; more if fewer than two would remain."""
+
+DEFINITIONS_LISTED = 8
+"""Most definitions with a worst error."""
+
+ROOT_GROUP = "/"
+
+COMPARED = {"": ("deformation_error", "reference_displacement"), "shapes": ("error", "reference_value")}
+"""Error and reference of groups whose definitions are compared."""
+
+
+FINITE_STRAIN_GROUP = "/finite_strain"
+"""Group of references for nonlinear kinematics."""
+
+
+COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "reference_message"}
+"""Variables of groups that compare scenes with small-strain references."""
+
+
+def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
+    """Summarise a study's cells, with the errors of at most so many definitions."""
+    states = [state for name, data in groups.items() for state in _states(name, data)]
+    rows = [[what, str(count), said] for what, count, said, _ in states if count]
+    lines = [title, "", aligned(rows, left=2, right=(1,))]
+    for name, data in groups.items():
+        if name.strip("/") in COMPARED:
+            finite = groups.get(FINITE_STRAIN_GROUP) if name == ROOT_GROUP else None
+            lines += _answers(data, finite, most, *COMPARED[name.strip("/")])
+    for name, data in groups.items():
+        if COMPARED_VARIABLES <= set(data):
+            lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
+    holes = []
+    for what, count, _, lost in states:
+        for status, cells in lost.items():
+            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {count}", *_cell_lines(cells)]
+        holes += [f"{sum(map(len, lost.values()))} of {count} {what}"] if lost else []
+    if holes:
+        lines += ["", f"{NOT_ALL_SOLVED}: {'; '.join(holes)}. dataset.nc names each, and why: `status`, `message`."]
+    return "\n".join(lines) + "\n"
+
+
+Cells = list[tuple[str, str]]
+
+
+def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, Mapping[Status, Cells]]]:
+    """Subject, number of cells, their statuses in words and unsolved cells of each status variable."""
+    for variable in data.data_vars.values():
+        label = str(variable.name)
+        message = label.removesuffix("status") + "message"
+        if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
+            continue
+        flags, messages = variable.values, data[message].values
+        places = {status: flags == status for status in Status if status and (flags == status).any()}
+        lost: dict[Status, Cells] = {
+            one: _cells(data, variable.dims, at, messages) for one, at in places.items() if one != Status.SOLVED
+        }
+        part = label.removesuffix("status").strip("_").replace("_", " ")
+        what = "scenes" if name == ROOT_GROUP else ", ".join(filter(None, (name.strip("/"), part)))
+        said = ", ".join(f"{at.sum()} {_words(status)}" for status, at in places.items())
+        yield what, sum(int(at.sum()) for at in places.values()), said, lost
+
+
+def _cells(data: "xr.Dataset", dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
+    return [(place_text(data, dims, place), str(messages[tuple(place)])) for place in np.argwhere(there)]
+
+
+def _words(status: Status) -> str:
+    return str(status).replace("_", " ")
+
+
+def _cell_lines(cells: Cells) -> Iterator[str]:
+    """Lines on some cells, one for each reason first, and the number of others."""
+    reasons: dict[str, Cells] = {}
+    for cell in cells:
+        reasons.setdefault(without_numbers(cell[1]), []).append(cell)
+    order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
+    named = len(order) if len(order) <= CELLS_NAMED + 1 else CELLS_NAMED
+    yield from (f"  {shown(': '.join(filter(None, cell)))}" for cell in order[:named])
+    if named < len(order):
+        yield f"  and {len(order) - named} more"
+
+
+def _answers(
+    data: "xr.Dataset", finite: "xr.Dataset | None", most: int | None, error: str, reference: str
+) -> Iterator[str]:
+    """Errors of definitions, and what to type."""
+    if "definition" in data.get(error, data).dims:
+        other = None if finite is None else variables(finite)
+        cells = requested_cells(variables(data), other, error)
+        yield from _errors(cells, data[error], cells[reference], other, most)
+        if error == "deformation_error":  # of shapes quantities have errors
+            yield from _stiffness_to_type(cells)
+
+
+def _errors(
+    cells: Columns, error: "xr.DataArray", reference: np.ndarray, finite: Variables | None, most: int | None
+) -> Iterator[str]:
+    """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
+    found = sorted(definition_errors(cells), key=lambda one: -one.errors.max())
+    if found:
+        what = str(error.name).replace("_", " ")
+        yield from ("", f"{what}s, (network - reference) / |reference|, of solved scenes within the reference")
+        if finite is not None and own_laws(finite):
+            yield "  nonlinear networks against finite strain, linear ones against small strain"
+        by = [name for name in ("definition", "kinematics") if name in cells]
+        others = [str(name) for name in error.dims if name not in by]
+        units = {name: str(error[name].attrs.get("units", "1")) for name in others}
+        rows = []
+        for one in found[:most]:
+            worst, place = float(cells["valid_error"][one.worst]), {name: cells[name][one.worst] for name in others}
+            kind = str(cells["quantity_kind"][one.worst]) if "quantity_kind" in cells else "displacement"
+            word = sign_word(worst, float(reference[one.worst]), kind)
+            numbers = [f"{100 * one.median:.3g} %", f"{100 * worst:+.3g} %"]
+            rows.append([*one.labels, len(one.errors), *numbers, word, cell_text(place, units)])
+        heads = [*by, "values" if "quantity" in others else "scenes", "median", "worst", "", "at"]
+        yield from aligned([heads, *rows], 2, range(len(by), len(by) + 3)).splitlines()
+    if most is not None and len(found) > most:
+        yield f"  and of {len(found) - most} more at most {100 * found[most].errors.max():.2f} %"
+
+
+def _stiffness_to_type(cells: Columns) -> Iterator[str]:
+    """What to type on the finest mesh of each type and material: of the best definition and the best uniform one."""
+    rows = [
+        [one.definition, *one.labels, f"{1e3 * one.mesh_size:.4g} mm", range_text(one.inside), range_text(one.outline),
+         f"{one.ratio:.3g}" if np.isfinite(one.ratio) else "", f"{100 * one.median_error:.2g} %"]
+        for answers in what_to_type(cells)
+        for one in answers
+    ]  # fmt: skip
+    if rows:
+        yield from ("", "what to type [N/m], on the finest mesh: the best definition, and the best uniform stiffness")
+        heads = ["definition", "mesh type", "material", "size", "inside", "outline", "inside / E t", "median error"]
+        yield from aligned([heads, *rows], 2, range(3, 8)).splitlines()
+
+
+def _lines_on_references(root: "xr.Dataset", called: str) -> Iterator[str]:
+    """Missing or inapplicable references with their scenes."""
+    requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
+    beyond = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
+    for scenes, what in (
+        (requested & ~there, "without a reference, and so without an error"),
+        (beyond, "beyond small strain, so the error is not the network's alone"),
+    ):
+        if not scenes.any():
+            continue
+        few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
+        few = few.transpose(*root.reference_message.dims)
+        cells = _cells(root, few.dims, few.values, root.reference_message.values)
+        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_cell_lines(cells))
+
+
+# -- of a file ---------------------------------------------------------------------------------------------------------
+
+
+class Info(str):
+    """Text that terminals and notebooks show verbatim."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self)}</pre>"
+
+
+def info(path: str | os.PathLike[str]) -> Info:
+    """Sum up the dataset of a study, as `springtune info` does.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``results/<study>/dataset.nc``, or its folder.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        As of `open`.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> said = st.info("results/mine")
+    >>> "groups, their variables and dimensions" in said, "springtune" in said
+    (True, True)
+    """
+    with reading.open(path) as tree, reading.guarded(path):
+        return Info(info_text(tree, reading.dataset_file(path)))
+
+
+def info_text(tree: "xr.DataTree", path: Path) -> str:
+    """Content of a dataset as text."""
+    made = f", made {tree.attrs['created']}" if "created" in tree.attrs else ""
+    study = tree.attrs.get("study", "unknown")
+    head = [tree.attrs.get("title", study), f"study {study}: {path}, {bytes_text(path.stat().st_size)}{made}"]
+    cells = text({node.path: node.to_dataset() for node in tree.subtree}, "", None).strip("\n")
+    return "\n\n".join(filter(None, [paragraphs([head]), cells, paragraphs([_groups(tree), _provenance(tree)])]))
+
+
+def _groups(tree: "xr.DataTree") -> list[str]:
+    rows = []
+    for node in tree.subtree:
+        sizes = node.to_dataset().drop_vars(node.coords).sizes.items()  # without inherited dimensions
+        rows.append([f"  {node.path}", len(node.data_vars), ", ".join(f"{name} {size}" for name, size in sizes)])
+    return ["groups, their variables and dimensions", *aligned(rows, 0, (1,)).splitlines()]
+
+
+def _provenance(tree: "xr.DataTree") -> list[str]:
+    lines = ["made with", f"  springtune {tree.attrs.get('springtune_version', 'unknown')}"]
+    lines += [f"  commit {tree.attrs['git_commit']}"] if tree.attrs.get("git_commit") else []
+    software = from_json(tree.attrs.get("software")).items()
+    said = ", ".join(f"{name} {version}" for name, version in software if version != "none")
+    lines += [f"  {said}"] if said else []
+    return lines + [f"  sha256 {digest}  {name}" for name, digest in from_json(tree.attrs.get("inputs")).items()]
+
+
+# -- of a run ----------------------------------------------------------------------------------------------------------
 
 Jobs = Mapping[str, Job]
 
