@@ -14,7 +14,7 @@ from springtune.studies.config.messages import words
 # Before the models of sections are made, and nowhere else: reading docstrings takes a tenth of Snakemake's start.
 Section.model_config["use_attribute_docstrings"] = True
 
-from springtune.studies.config.kind import kinds  # noqa: E402
+from springtune.studies.config.model import kinds  # noqa: E402
 from springtune.studies.config.sections import study_model  # noqa: E402
 
 SCHEMA, MANUAL = "study.schema.json", "README.md"

@@ -22,7 +22,7 @@ from packaging.requirements import Requirement
 import springtune as st
 from springtune.cli import main
 from springtune.mesh.formats import write_mesh
-from springtune.studies.config.kind import outputs
+from springtune.studies.config.model import outputs
 
 from campaigns import Campaign
 from pages import blocks as blocks_of

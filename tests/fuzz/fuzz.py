@@ -36,7 +36,7 @@ from springtune.mesh.cells import corner_angles, signed_areas
 from springtune.mesh.formats import read_beam_mesh, read_shape, write_mesh
 from springtune.mesh.sheets import sheet_fault
 from springtune.problem.shapes import AssumptionWarning
-from springtune.studies.config.kind import kinds
+from springtune.studies.config.model import kinds
 from springtune.studies.kinds.bodies.kind import summary
 
 SECONDS, BYTES = 10, 1_000_000_000

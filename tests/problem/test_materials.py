@@ -13,8 +13,8 @@ from hypothesis import strategies as some
 import springtune as st
 from springtune.problem.materials import CONSTANTS, material_of
 from springtune.studies.config.expand import declared
-from springtune.studies.config.kind import kinds
 from springtune.studies.config.messages import Problems
+from springtune.studies.config.model import kinds
 from springtune.studies.config.sections import study_model
 from springtune.studies.runs.keys import beam_key, material_key
 from springtune.studies.runs.source import hash_of

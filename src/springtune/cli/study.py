@@ -66,7 +66,7 @@ def new(study: str, shape: bool, source: str | None) -> None:
 def _copy(name: str, path: Path) -> None:
     """Copy a study that comes along, and the files that it names, none of which is overwritten."""
     from ..studies.kinds import load_study
-    from ..studies.runs.provenance import input_files
+    from ..studies.runs.keys import input_files
 
     folder = workflow_folder() / CONFIG_FOLDER
     known = sorted(one.stem for one in folder.glob("*.yaml"))
@@ -123,7 +123,7 @@ def scenes(config: Path, results: Path) -> None:
     Counts scenes, meshes, references and curves of each grid, and stored results. Mistakes are printed with their
     lines.
     """
-    from ..studies.config.kind import kinds
+    from ..studies.config.model import kinds
     from ..studies.kinds.bodies.kind import summary
 
     study = _load(config)

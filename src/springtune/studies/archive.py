@@ -10,7 +10,7 @@ from springtune.safe_io import replacing, shown
 
 from .config.model import Study
 from .output import reading
-from .runs.provenance import input_files
+from .runs.keys import input_files
 from .runs.source import checksum
 
 SUMS, INSTALLED, README = "SHA256SUMS", "versions.json", "README.md"

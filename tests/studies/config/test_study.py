@@ -16,8 +16,7 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.config.kind import kinds, outputs
-from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec
+from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec, kinds, outputs
 
 from tables import STUDIES, beside, refused_files, study_text
 

@@ -5,7 +5,7 @@ import pytest
 
 from springtune.studies.kinds import collect
 from springtune.studies.output.dataset import select_own_law
-from springtune.studies.runs import provenance
+from springtune.studies.runs import keys
 
 import campaigns
 from tables import STUDIES
@@ -20,7 +20,7 @@ def gathered(tmp_path):
     def gather(text):
         study = campaigns.load_text(tmp_path, text)
         campaigns.do_stages(study, tmp_path)
-        return collect.groups_of_study(study, tmp_path), provenance.attributes(study)
+        return collect.groups_of_study(study, tmp_path), keys.origin(study)
 
     return gather
 

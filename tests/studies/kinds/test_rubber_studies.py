@@ -11,7 +11,7 @@ import springtune as st
 from springtune.studies.kinds.bodies import kind as bodies
 from springtune.studies.kinds.bodies.tables import like_with_like
 from springtune.studies.kinds.moduli.figures import tables
-from springtune.studies.runs.provenance import inputs
+from springtune.studies.runs.keys import inputs
 
 from campaigns import Campaign, load_text
 from tables import STUDIES

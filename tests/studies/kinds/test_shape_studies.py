@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.mesh.formats import write_mesh
-from springtune.studies.config.kind import outputs
+from springtune.studies.config.model import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.bodies.kind import shape_mesh_keys, shape_reference_task, shape_scene_task
 from springtune.studies.kinds.bodies.shapes import LARGEST_FILE_CHECKED

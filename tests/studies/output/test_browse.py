@@ -14,7 +14,7 @@ from test_dataset import GROUPS
 import springtune as st
 from springtune.cli import main
 from springtune.problem.quantities import Status
-from springtune.studies.config.kind import kinds
+from springtune.studies.config.model import kinds
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.samples import PARAMETERS

@@ -10,11 +10,11 @@ import xarray as xr
 import springtune as st
 from cf import complaints
 from springtune.registry import import_name
-from springtune.studies.config.kind import modules
+from springtune.studies.config.model import modules
 from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK_BYTES, Group
-from springtune.studies.runs import provenance
+from springtune.studies.runs import keys
 from springtune.studies.runs.source import clone, workflow_folder
 
 from tables import STUDIES, beside, slow_but
@@ -87,7 +87,7 @@ class TestConventions:
         numbers = {"mesh_size", "stiffness_ratio", "face_position", "poisson_ratio", "friction", "strain"}
         axes = {one: (1.0, 2.0) if one in numbers else ("one", "two") for one in dimensions}
         study = st.load_study(small(tmp_path))
-        attributes = provenance.attributes(study)
+        attributes = keys.origin(study)
         dataset.write(tmp_path / "dataset.nc", {"/": group.empty(axes)}, attributes)
         assert complaints(tmp_path / "dataset.nc") == []
 
@@ -124,10 +124,10 @@ class TestProvenance:
     def test_a_changed_checkout_is_told(self, tmp_path):
         package, path = library(tmp_path), small(tmp_path)
         committed(tmp_path)
-        clean = provenance.attributes(st.load_study(path), package)
+        clean = keys.origin(st.load_study(path), package)
         assert len(clean["git_commit"]) == 40
         path.write_text(path.read_text().replace("Small", "Smaller"))
-        dirty = provenance.attributes(st.load_study(path), package)
+        dirty = keys.origin(st.load_study(path), package)
         assert dirty["git_commit"] == clean["git_commit"] + "+changes"
 
     def test_a_built_package_has_the_commit_that_it_was_built_from(self, tmp_path):
@@ -137,10 +137,10 @@ class TestProvenance:
         path = small(package / "workflow/config")
         committed(tmp_path)
         assert workflow_folder(package) == package / "workflow" and clone(package) is None
-        unknown = provenance.attributes(st.load_study(path), package)
+        unknown = keys.origin(st.load_study(path), package)
         assert unknown["git_commit"] == ""
         (package / "commit.txt").write_text("f00d\n")
-        known = provenance.attributes(st.load_study(path), package)
+        known = keys.origin(st.load_study(path), package)
         assert known["git_commit"] == "f00d"
 
 

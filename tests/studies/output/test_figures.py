@@ -16,7 +16,7 @@ from PIL import Image
 from pypdf import PdfReader
 
 import springtune as st
-from springtune.studies.config.kind import outputs
+from springtune.studies.config.model import outputs
 from springtune.studies.output import style
 from springtune.studies.output.style import NETWORK_LINE_WIDTH, png_and_pdf
 from springtune.studies.runs.keys import closure

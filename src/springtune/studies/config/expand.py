@@ -22,9 +22,8 @@ from springtune.springs.lattice import COEFFICIENT
 
 from . import checks
 from .fields import FILES, RANGE_DIGITS, BeamName, Load, MaterialName, MeshType, Section
-from .kind import StudyKind
 from .messages import Key, Problems, StudyError, control_character_fault, read_study, show, validated
-from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study
+from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, StudyKind
 from .sections import GRID_PARAMETERS, StudyConfig, combinations, study_model
 
 Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)

@@ -14,8 +14,8 @@ from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, Anisotropic
 
 from . import fields
 from .fields import Named, OneOrMore, Section, default, one_of
-from .kind import StudyKind
 from .messages import refuse, words
+from .model import StudyKind
 
 
 class BeamConfig(Section):

@@ -1,15 +1,11 @@
 """Kinds of study: one package each."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from ..config.kind import kinds
-
-if TYPE_CHECKING:
-    from ..config.model import Study
+from ..config.model import Study, kinds
 
 
-def load_study(path: str | Path) -> "Study":
+def load_study(path: str | Path) -> Study:
     """Read, validate and expand a study.
 
     Parameters

@@ -9,10 +9,9 @@ import xarray as xr
 from springtune.registry import import_name
 from springtune.safe_io import write_json, write_text
 
-from ..config.kind import StudyKind, kinds, outputs
-from ..config.model import Study
+from ..config.model import Study, StudyKind, kinds, outputs
 from ..output import dataset, summary
-from ..runs import job, plan, provenance
+from ..runs import job, keys, plan
 from ..runs.store import DamagedError
 from . import load_study
 
@@ -21,7 +20,7 @@ def run(study: Study, folder: Path, output: Path) -> None:
     """Write the dataset and the summary of a study from its stored results."""
     try:
         groups = groups_of_study(study, folder)
-        dataset.write(output, groups, provenance.attributes(study))
+        dataset.write(output, groups, keys.origin(study))
     except DamagedError as error:
         job.forget_job_of(error.path, folder)
         raise SystemExit(str(error)) from None

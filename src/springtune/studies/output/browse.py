@@ -28,7 +28,7 @@ from springtune.problem.compare import error_text
 from springtune.problem.quantities import Status
 from springtune.safe_io import write_json, write_text
 
-from ..config.kind import VIEWS, kind_files
+from ..config.model import VIEWS, kind_files
 from . import answers, reading
 from .answers import Columns, DefinitionErrors, Variables, definition_errors, requested_cells
 from .text import label_text, range_text

@@ -22,8 +22,7 @@ from springtune.problem.quantities import OF_BODIES, SWEPT, Status, shown_order
 from springtune.problem.shapes import beam_label
 from springtune.safe_io import replacing
 
-from ..config.kind import EMPTY_VALUES
-from ..config.model import STRAINED_REFERENCE
+from ..config.model import EMPTY_VALUES, STRAINED_REFERENCE
 from .answers import own_law, own_laws, sign_of_displacements, variables
 
 STATUS = tuple(map(str, Status))

@@ -12,15 +12,13 @@ import xarray as xr
 from springtune.registry import import_name
 from springtune.safe_io import write_bytes, write_json, write_text
 
-from ..config.kind import modules, outputs
+from ..config.model import Output, modules, outputs
 from . import reading
 from .dataset import sign_of_errors
 from .text import csv_text, decimals, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from ..config.kind import Output
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
@@ -49,7 +47,7 @@ def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> No
     write_json(record, {"digest": digest})
 
 
-def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
+def _draw(output: Output, tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     import matplotlib.pyplot as plt
 
     from . import style
@@ -64,7 +62,7 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
         plt.close(figure)
 
 
-def _single(tree: xr.DataTree, output: "Output") -> "Axes":
+def _single(tree: xr.DataTree, output: Output) -> "Axes":
     """Draw the figure of an output that draws on one panel."""
     from . import style
 

@@ -26,7 +26,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from ..output import reading
 from ..output.dataset import STATUS
-from ..runs import provenance
+from ..runs import keys
 from . import PaperError
 
 HASH_DIGITS = 12
@@ -53,7 +53,7 @@ class Dataset:
             "title": attributes["title"],
             "version": attributes["springtune_version"],
             "commit": attributes["git_commit"][:HASH_DIGITS] or "no commit",
-            "changed": attributes["git_commit"].endswith(provenance.CHANGED),
+            "changed": attributes["git_commit"].endswith(keys.CHANGED),
             "created": attributes["created"][:10],
             "software": json.loads(attributes["software"]),
             "sha256": self.sha256[:HASH_DIGITS],

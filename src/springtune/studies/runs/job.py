@@ -42,7 +42,7 @@ def _note(tasks: str, digest: str) -> dict[str, Any]:
 def _plan(study: str, folder: Path) -> None:
     """Write the notes of all jobs of a study."""
     from ..config.expand import load
-    from ..config.kind import kinds  # here: a run has written them
+    from ..config.model import kinds  # here: a run has written them
     from .plan import stage_jobs
 
     for job in stage_jobs(load(study, kinds()), folder).values():

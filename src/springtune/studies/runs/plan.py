@@ -14,11 +14,9 @@ from typing import Any
 
 from springtune.safe_io import write_bytes
 
-from ..config.kind import FORMATS, VIEWS, Output, Stage, kind_files, kinds, modules, outputs
-from ..config.model import Study
+from ..config.model import FORMATS, VIEWS, Output, Stage, Study, kind_files, kinds, modules, outputs
 from . import attempts, store
-from .keys import stage_key
-from .provenance import inputs
+from .keys import inputs, stage_key
 from .source import PACKAGE, RECORDS, TASKS, checksum, hash_of, read_note
 
 MOST_JOBS = 64

@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.model import Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names

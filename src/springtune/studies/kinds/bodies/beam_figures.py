@@ -10,7 +10,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT, with_unit
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.kind import distinct
+from ...config.model import distinct
 from ...output import style
 from ...output.dataset import (
     at,

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,8 +17,7 @@ from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.kind import declared_variables
-from ...config.model import Reference, keeps_fields
+from ...config.model import Reference, Study, declared_variables, keeps_fields
 from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING_ATTRIBUTES, UGRID, Group
 from ...runs import store
 from . import any_reference, stored
@@ -26,9 +25,6 @@ from . import kind as bodies
 from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, pressed
 from .stored import FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
-
-if TYPE_CHECKING:
-    from ...config.model import Study
 
 MESH = ("beam", "mesh_type", "mesh_size")
 REFERENCE = ("beam", "material", "load")
@@ -93,7 +89,7 @@ PRINTED_PREFIX = "paper_"
 """Prefix of variables of printed cells, which have no swept dimensions."""
 
 
-def swept(group: Group, study: "Study") -> Group:
+def swept(group: Group, study: Study) -> Group:
     """Group whose variables also have the swept dimensions that they depend on."""
     further: dict[str, list[str]] = {}
     for name, (dimensions, *_) in group.variables.items():
@@ -108,7 +104,7 @@ def swept(group: Group, study: "Study") -> Group:
     return found
 
 
-def fields_of(study: "Study") -> Group:
+def fields_of(study: Study) -> Group:
     """Group of whole fields, which are stored for one value of each swept parameter: the group says which."""
     place = "beam", "mesh_type", "material", "load"
     swept = {

@@ -19,8 +19,7 @@ from springtune.reference.answers import unit_problem, unit_scales
 from springtune.safe_io import aligned
 from springtune.springs.base import DEFINITIONS
 
-from ...config.kind import Stage, StudyKind
-from ...config.model import SceneSpec, Study, cache_by_study, keeps_fields, shown
+from ...config.model import SceneSpec, Stage, Study, StudyKind, cache_by_study, keeps_fields, shown
 from ...runs import attempts
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task

@@ -7,9 +7,8 @@ from typing import Any
 
 from springtune.problem.loads import LOADS
 
-from ...config.kind import Output, distinct
-from ...config.kind import stem as figure_stem
-from ...config.model import Study, cache_by_study
+from ...config.model import Output, Study, cache_by_study, distinct
+from ...config.model import stem as figure_stem
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 """Dimensions with one label in a figure of sensitivity curves."""

@@ -463,7 +463,7 @@ def files_of(shape, folder):
 
 
 def expand(config, declared):
-    """Shapes of a study that has any, see `springtune.studies.config.kind.StudyKind`."""
+    """Shapes of a study that has any, see `springtune.studies.config.model.StudyKind`."""
     found, referred, finite = set(), set(), set()
     for grid in config.shape_grids.values():
         for name in grid.shape:
@@ -513,7 +513,7 @@ LARGEST_FILE_CHECKED = 1_000_000
 
 
 def check(config, problems):
-    """Add what is wrong, see `springtune.studies.config.kind.StudyKind`."""
+    """Add what is wrong, see `springtune.studies.config.model.StudyKind`."""
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
         for part, material in shape.parts.items():

@@ -4,7 +4,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from ...config.kind import declared_dimensions, declared_variables
+from ...config.model import declared_dimensions, declared_variables
 from ...output.dataset import Group
 from ...runs.plan import rows as stored_rows
 from . import RUN_ENDS, SETTING

@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Output, Stage, StudyKind
+from ...config.model import Output, Stage, StudyKind
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, material_key, mesh_type_key, version_of
 from ...runs.plan import Task
 from . import SETTING

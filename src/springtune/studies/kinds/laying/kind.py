@@ -12,7 +12,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.model import Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 

@@ -10,8 +10,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.kind import Output, Stage, StudyKind, declared_dimensions, declared_variables
-from ...config.model import MeshSpec
+from ...config.model import MeshSpec, Output, Stage, StudyKind, declared_dimensions, declared_variables
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
 from ..bodies.kind import expected_seconds, mesh_key, mesh_source, parameters, particles

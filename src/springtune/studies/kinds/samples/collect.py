@@ -13,7 +13,7 @@ from springtune.problem.quantities import Status
 from springtune.reference.answers import unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.kind import declared_variables
+from ...config.model import declared_variables
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference

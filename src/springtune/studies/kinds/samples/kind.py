@@ -14,8 +14,8 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
-from ...config.kind import Output, Stage, StudyKind, stem
 from ...config.messages import OrSection, refuse, show, words
+from ...config.model import Output, Stage, StudyKind, stem
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import hash_of
