@@ -10,8 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import springtune as st
-from springtune.problem.materials import RUBBER_TESTS
-from springtune.problem.rubber import TensileTest
+from springtune.problem.materials import RUBBER_TESTS, TensileTest
 from springtune.springs.rubber import SpringLaw
 
 TRELOAR = Path(__file__).parents[1] / "config/treloar"

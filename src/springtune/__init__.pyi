@@ -27,8 +27,8 @@ from .problem.loads import LOADS as LOADS
 from .problem.materials import AnisotropicMaterial as AnisotropicMaterial
 from .problem.materials import Material as Material
 from .problem.materials import Rubber as Rubber
+from .problem.materials import fit_rubber as fit_rubber
 from .problem.quantities import Status as Status
-from .problem.rubber import fit_rubber as fit_rubber
 from .problem.shapes import Beam as Beam
 from .problem.shapes import Hole as Hole
 from .problem.shapes import LoadCase as LoadCase

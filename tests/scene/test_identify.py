@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.cli.study import template_text
-from springtune.problem.rubber import TestDataError
+from springtune.problem.materials import TestDataError
 from springtune.reference.by_constants import ENTRIES, Family
 from springtune.reference.shapes import solve_shape
 from springtune.scene.identify import Model

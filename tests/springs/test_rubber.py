@@ -14,8 +14,7 @@ from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh.cells import signed_areas
 from springtune.problem.loads import AXIAL, BENDING, FACE
-from springtune.problem.materials import RUBBER_TESTS
-from springtune.problem.rubber import TensileTest, TestDataError
+from springtune.problem.materials import RUBBER_TESTS, TensileTest, TestDataError
 from springtune.reference.finite_strain import NeoHooke, law_of, solve_finite_strain
 from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.springs.rubber import FLAT, SpringLaw

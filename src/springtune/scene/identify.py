@@ -16,9 +16,8 @@ from scipy.spatial import KDTree
 from scipy.stats import f, t
 
 from ..mesh.sheets import parts_of
-from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, rotated
+from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, TestDataError, rotated
 from ..problem.quantities import Number, nearest, positive
-from ..problem.rubber import TestDataError
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook

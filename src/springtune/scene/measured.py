@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from ..mesh.formats import read_shape
 from ..mesh.sheets import GroupedMesh
 from ..problem.loads import LOADS, MIDDLE, Side
+from ..problem.materials import TestDataError
 from ..problem.quantities import Number, nearest, positive, put, quantity
-from ..problem.rubber import TestDataError
 from ..problem.shapes import Beam, LoadCase, Segment, Shape
 from ..reference.by_constants import Family
 from ..safe_io import csv_rows, number_of, numbers

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..problem.rubber import CHECKED_STRETCHES, TensileTest, TestDataError, check_terms, fit, read_test
+from ..problem.materials import CHECKED_STRETCHES, TensileTest, TestDataError, check_terms, fit, read_test
 
 LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""

@@ -155,7 +155,7 @@ class MaterialConfig(Section):
     def material(self, name: str, folder: Path = Path()) -> AnyMaterial:
         """The material; its files are relative to a folder. Raises ValueError for a file that is not a test."""
         if self.uniaxial_test is not None:
-            from springtune.problem.rubber import fit_rubber  # here: few studies need it
+            from springtune.problem.materials import fit_rubber
 
             others = {"equibiaxial": self.equibiaxial_test, "pure_shear": self.pure_shear_test}
             return fit_rubber(
