@@ -175,7 +175,7 @@ def read_body(
 
 def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     from ..mesh.cells import MESH_TYPES
-    from ..scene.meshes import make_mesh, read_mesh
+    from ..scene.single import make_mesh, read_mesh
 
     material, mesh_type, size = read_material(given), given["mesh"] or "structured", None
     beam = read_beam(given["beam"], given["thickness"])
@@ -232,7 +232,7 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
 
 def _shape_mesh(shape: "Shape", refined: Mapping[str, float], _: str, size: float | None) -> "GroupedMesh":
     """Make the mesh of a shape, refined as in its study."""
-    from ..scene.meshes import mesh_shape, read_shape  # here, since studies are read without scipy
+    from ..scene.single import mesh_shape, read_shape  # here, since studies are read without scipy
 
     if size is None:
         return read_shape(shape.file, shape.unit)

@@ -274,8 +274,7 @@ class Engine(Declaration):
         Session
         """
         self.check(setting, net)
-        session: Session = self.function(net, setting, number(damping, "damping", 0))
-        return session
+        return self.function(net, setting, number(damping, "damping", 0))
 
 
 def version_numbers(text: str) -> tuple[int, ...]:

@@ -21,8 +21,7 @@ def shares(net: SpringNet, setting: Setting) -> np.ndarray:
     weights = np.where(net.held, 0, 1 / net.masses[:, None])[net.springs].sum(axis=1)
     along = (net.points[net.springs[:, 1]] - net.points[net.springs[:, 0]]) / net.rest_lengths[:, None]
     grown = net.stiffness * setting.step**2 * np.einsum("ij,ij->i", weights, along**2)
-    found: np.ndarray = -np.expm1(-np.log1p(grown) / setting.iterations)
-    return found
+    return -np.expm1(-np.log1p(grown) / setting.iterations)
 
 
 @engine(

@@ -397,8 +397,7 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
 
 def _mean(seen: list[np.ndarray]) -> np.ndarray:
     """Mean displacement, of the first and last windows with less weight: no swing has whole periods in them."""
-    found: np.ndarray = np.average([mean for mean, _, _ in seen], axis=0, weights=np.hanning(len(seen) + 2)[1:-1])
-    return found
+    return np.average([mean for mean, _, _ in seen], axis=0, weights=np.hanning(len(seen) + 2)[1:-1])
 
 
 def _swing(seen: list[np.ndarray]) -> float:

@@ -136,8 +136,7 @@ class _Descent(Textbook):
             followed = ((self.v - self.last) * self.push).sum(axis=1, keepdims=True) / self.sizes
             x -= (1 - np.clip(followed, 0, 1)) * self.push
             self.last = self.v
-        found: np.ndarray = _sweeps(x, y, self.inertia, self.weights, *self.groups, self.iterations)
-        return found
+        return _sweeps(x, y, self.inertia, self.weights, *self.groups, self.iterations)
 
 
 VERTEX_LAWS = ("area", "biquadratic")

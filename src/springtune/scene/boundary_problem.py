@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from numbers import Real
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -85,7 +85,8 @@ class BoundaryProblem(ABC):
 
     def reference_values(self, law: str = "") -> dict[str, float]:
         """Quantities of interest of the reference."""
-        return dict(cast("ShapeReference", self.reference(law)).values)
+        found: Any = self.reference(law)  # of a shape
+        return dict(found.values)
 
     def law(self, definition: Definition) -> str:
         """Law at finite strain of the reference of a definition's network; none of small strain."""
@@ -93,7 +94,7 @@ class BoundaryProblem(ABC):
 
     def objection(self) -> str:
         """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
-        found = cast("ReferenceSolution | ShapeReference", self.reference())
+        found: Any = self.reference()  # in small strain
         return beyond_linear(found.rotation, found.strain)
 
     def springs(self, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
@@ -226,8 +227,6 @@ class BeamProblem(BoundaryProblem):
 class ShapeProblem(BoundaryProblem):
     """A shape under one of its load cases, times `scale` [1]."""
 
-    scale: float
-
     def __init__(
         self,
         shape: Shape,
@@ -324,7 +323,7 @@ class ShapeProblem(BoundaryProblem):
 
                 found = solve_shape(self.shape, case, self.by_part, as_read)
             self.sheet.references[key] = self.shape, found
-        reference: ShapeReference = self.sheet.references[key][1]
+        reference = self.sheet.references[key][1]
         return reference if law or self.scale == 1 else reference.scaled(self.scale)
 
     def law(self, definition: Definition) -> str:
@@ -368,7 +367,6 @@ def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: Group
         if not isinstance(one, AnyMaterial):
             of = f" of part {name!r}" if name else ""
             raise ValueError(f"material{of}: {one!r} is not a Material; give one such as {A_MATERIAL}")
-    for name in given:
         if name and name not in parts:
             known = f"is no part of the mesh; known: {', '.join(map(repr, parts))}"
             raise ValueError(f"material: {name!r} {grouped.unusable.get(name, known)}")
@@ -379,14 +377,10 @@ def _growth(mesh: Mesh, displacements: np.ndarray, linear: bool) -> float:
     """Growth of the area of a mesh [m2]."""
     total = 0.0
     for corners in mesh.cells.values():
-        place, moved = mesh.points[corners], displacements[corners]
-        x, y = (np.roll(place, -1, axis=1) - np.roll(place, 1, axis=1)).transpose(2, 0, 1)
-        growth = 0.5 * (moved[..., 0] * y - moved[..., 1] * x).sum(axis=1)
-        if not linear:
-            moved = moved - moved[:, :1]
-            after = np.roll(moved, -1, axis=1)
-            growth += 0.5 * (moved[..., 0] * after[..., 1] - moved[..., 1] * after[..., 0]).sum(axis=1)
-        total += float(growth.sum())
+        moved = displacements[corners] - displacements[corners[:, :1]]
+        middle = mesh.points[corners] + (0.0 if linear else 0.5 * moved)
+        x, y = (np.roll(middle, -1, axis=1) - np.roll(middle, 1, axis=1)).transpose(2, 0, 1)
+        total += 0.5 * float((moved[..., 0] * y - moved[..., 1] * x).sum())
     return total
 
 
@@ -398,8 +392,7 @@ def check_filled(mesh: Mesh, beam: Beam) -> None:
         shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
         wanted = " x ".join(f"{side:.6g}" for side in 1e3 * box)
         raise ValueError(f"mesh: extends over {shown} mm, its beam over {wanted} mm from the origin; {remedy}")
-    wrong = box_fault(mesh)
-    if wrong:
+    if wrong := box_fault(mesh):
         raise ValueError(f"mesh: does not fill its beam: {wrong}; or {remedy}")
 
 

@@ -119,11 +119,6 @@ def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
     return np.array(found)
 
 
-def squares(tables: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
-    """Sums of the squares of residuals of each block."""
-    return np.array([(one * table[:, 0]) @ (one * table[:, 0]) for table, one in zip(tables, noise)])
-
-
 class Model:
     """Tests as functions of constants: for each a family of solutions, its numbers, and the material's angle."""
 
@@ -214,8 +209,8 @@ class Model:
         steps, close = np.zeros(len(names)), {"xtol": 1e-10, "ftol": 1e-10}
         for _ in range(20):  # until the noise that is estimated settles
             steps = least_squares(lambda s: table(s)[:, 0], steps, lambda s: table(s)[:, 1:], bounds.T, **close).x
-            sums = squares(tables(steps.tobytes(), noise.tobytes()), np.ones(len(noise)))
-            before, noise = noise, np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
+            sizes = np.array([np.linalg.norm(one[:, 0]) for one in tables(steps.tobytes(), noise.tobytes())])
+            before, noise = noise, np.maximum(noise * sizes / np.sqrt(freedom), LEAST_NOISE * self.sizes)
             if np.allclose(noise, before, rtol=1e-3, atol=0):
                 break
         _, sizes, right = np.linalg.svd(table(steps)[:, 1:], full_matrices=False)
@@ -376,9 +371,9 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str,
     for name, value in known.items():
         if name not in names:
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
-        if name in USUAL_POISSON_RATIOS and not -1 < number_of(value) <= 0.5:
-            raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
         is_ratio = name in USUAL_POISSON_RATIOS
+        if is_ratio and not -1 < number_of(value) <= 0.5:
+            raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
         constants[name] = number_of(value) if is_ratio else positive(value, "stress", f"known: {name}")
     constants = assume_usual(constants, {"nu12", "G12"} & {*names} - {*known})
     if len(known) == len(names):
@@ -407,9 +402,9 @@ def _fitted(
     lacking = model.undetermined(constants, free)
     names = [name for name in free if name not in lacking]
     constants, tables, noise, half = model.fit(assume_usual(constants, lacking), names)
-    for block, table, left in zip(model.blocks, tables, squares(tables, noise)):
-        own = block.unshifted(block.values)
-        share, excess = left / (own @ own or 1), correlation_excess(block.by_place(table[:, 0]), block.places)
+    for block, table, one in zip(model.blocks, tables, noise):
+        own, left = block.unshifted(block.values), one * table[:, 0]
+        share, excess = left @ left / (own @ own or 1), correlation_excess(block.by_place(left), block.places)
         if block.places.ndim > 1 and share > 1 - EXPLAINED_SHARE and excess > 0:
             explained = f"the load explains {100 * max(1 - share, 0):.0f} % of it"
             raise TestDataError(f"{block.label}: {explained}; check load, columns and signs")

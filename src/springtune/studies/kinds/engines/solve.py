@@ -9,8 +9,7 @@ from springtune.problem.materials import material_of
 from springtune.problem.quantities import Status
 from springtune.problem.shapes import Beam
 from springtune.reference.small_strain import ReferenceNotConvergedError
-from springtune.scene.meshes import make_mesh
-from springtune.scene.single import Scene
+from springtune.scene.single import Scene, make_mesh
 
 from . import RUN_ENDS, SETTING
 
