@@ -12,14 +12,13 @@ from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, 
 from springtune.mechanics.network import Network
 from springtune.mesh.cells import signed_areas
 from springtune.problem.compare import band
-from springtune.problem.shapes import Strip, Trapezoid
 from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
-from springtune.studies.kinds.laying.solve import lay
+from springtune.studies.kinds.laying.solve import Trapezoid, lay
 
 from tables import cases
 
 RUBBER, STEEL = st.Material(1e6, 0.49, name="rubber"), st.Material(210e9, 0.3, name="steel")
-STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)
+STRIP, TRAPEZOID = st.Beam(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)
 
 
 def body_of(mesh, held, forces=None, modulus=1e6, thickness=1e-3, **options):

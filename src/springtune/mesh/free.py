@@ -119,10 +119,6 @@ class _Stretch:
         """Stretches of equal length."""
         return self.cut(self.side.divided(count, self.low, self.high))
 
-    def parameter(self, share: float) -> float:
-        """Parameter of its side at a share of it."""
-        return self.low + share * (self.high - self.low)
-
 
 def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
     """Mesh a shape by netgen; lengths in m. Same input, same mesh; see `springtune.mesh_shape`."""
@@ -137,8 +133,7 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
             return _group_mesh(shape, made, chains, stretches)
         again: list[_Stretch] = []
         for number, one in enumerate(stretches):
-            shares = divided.get(number, []) if one.side.arc else []
-            again += one.cut([*map(one.parameter, (0.0, *shares)), one.high])
+            again += one.cut([one.low, *(divided.get(number, ()) if one.side.arc else ()), one.high])
         stretches = again
     raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
 
@@ -190,8 +185,8 @@ def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[_St
             cuts = {0.0, 1.0}
             size = min(sizes.get(name, sizes[""]) for name in (side.group, one.inner or "", one.outer or ""))
             for name, point in shape.points.items():
-                parameter = side.parameter_near(point, small)
-                if parameter is not None:
+                parameter, distance = side.nearest(point)
+                if distance <= small:
                     inside.pop(name, None)
                     parameter = next((end for end in (0.0, 1.0) if math.dist(point, side.at(end)) <= small), parameter)
                     cuts.add(parameter)
@@ -285,7 +280,7 @@ def _netgen(
     for line, first, second in made.pieces:
         pieces[line][first] = second
     chains, divided, corner = [], {}, order.tolist()
-    for number in range(len(stretches)):
+    for number, one in enumerate(stretches):
         following = pieces[number]
         chain = [corner[joined[number][0]]]
         while chain[-1] in following and len(chain) <= len(following):
@@ -295,12 +290,13 @@ def _netgen(
         chains.append(chain)
         if len(chain) > 2:
             start, along = points[chain[0]], points[chain[-1]] - points[chain[0]]
-            divided[number] = [float((points[i] - start) @ along / (along @ along)) for i in chain[1:-1]]
+            shares = [float((points[i] - start) @ along / (along @ along)) for i in chain[1:-1]]
+            divided[number] = [one.low + share * (one.high - one.low) for share in shares]
     placed = points * unit + origin
     placed[order] = list(numbers)
-    for number, shares in divided.items():
-        for i, share in zip(chains[number][1:], shares):
-            placed[i] = stretches[number].side.at(stretches[number].parameter(share))
+    for number, parameters in divided.items():
+        for i, parameter in zip(chains[number][1:], parameters):
+            placed[i] = stretches[number].side.at(parameter)
     return made._replace(points=placed), chains, divided
 
 

@@ -222,11 +222,6 @@ class OutlineSide:
         parameter = min((0.0, 1.0, 0.5 * (low + high)), key=lambda one: math.dist(self.at(one), point))
         return parameter, math.dist(self.at(parameter), point)
 
-    def parameter_near(self, point: Point, distance: float) -> float | None:
-        """Parameter at which it is nearest to a point, where that is within a distance [m]; None otherwise."""
-        parameter, found = self.nearest(point)
-        return parameter if found <= distance else None
-
 
 @dataclass(frozen=True)
 class Round:

@@ -115,35 +115,6 @@ def size_text(length: float, height: float) -> str:
     return f"{length / unit:.4g} x {height / unit:.4g} {name}"
 
 
-@dataclass(frozen=True)
-class Strip:
-    """Strip to be laid; lengths in m."""
-
-    length: float
-    height: float
-    thickness: float
-
-
-@dataclass(frozen=True)
-class Trapezoid:
-    """Symmetric trapezoid on its lower base; lengths in m."""
-
-    lower_base: float
-    upper_base: float
-    height: float
-
-    @property
-    def area(self) -> float:
-        """Area [m2]."""
-        return 0.5 * (self.lower_base + self.upper_base) * self.height
-
-    @property
-    def corners(self) -> list[tuple[float, float]]:
-        """Corners, counter-clockwise, the axis at x = 0: pairs of x and y [m]."""
-        low, high = 0.5 * self.lower_base, 0.5 * self.upper_base
-        return [(-low, 0.0), (low, 0.0), (high, self.height), (-high, self.height)]
-
-
 Place = tuple[Number, Number]
 """Coordinates [m]."""
 
@@ -709,8 +680,8 @@ class Shape:
         near = SIDE_TOLERANCE * max(high - low for low, high in zip(*self.extent))
         for one in self.rounds:
             for side in one.sides:
-                parameter = side.parameter_near(point, near)
-                if parameter is not None:
+                parameter, distance = side.nearest(point)
+                if distance <= near:
                     corners = [corner for corner in (side.start, side.end) if math.dist(corner, point) <= near]
                     return corners[0] if corners else side.at(parameter)
         if self.part_at(point) is None:
@@ -726,10 +697,8 @@ class Shape:
         """The outline and those of holes, each counter-clockwise; empty for a mesh file."""
         if not self.outline:
             return ()
-        holes = []
-        for hole in self.holes:
-            sides = _round(hole.outline, "hole")
-            holes.append(reverse_round(sides) if enclosed(sides) < 0 else sides)
+        given = [_round(hole.outline, "hole") for hole in self.holes]
+        holes = [reverse_round(sides) if enclosed(sides) < 0 else sides for sides in given]
         found = [Round(_round(self.outline, "outline"), "")]
         filled = sorted((enclosed(sides), number) for number, sides in enumerate(holes) if self.holes[number].part)
         for number, (hole, sides) in enumerate(zip(self.holes, holes)):

@@ -39,9 +39,5 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     spring_modulus = 4 / (3 * (1 + nu))  # over E
     reference = COEFFICIENT * spring_modulus * material.young_modulus * thickness
     modulus = (3 * nu - 1) / (2 * (1 - nu**2)) / (COEFFICIENT * spring_modulus)
-    energies: tuple[AreaEnergy, ...] = ()
-    if abs(modulus) > 1e-15:
-        energies = tuple(
-            AreaEnergy(mesh.points, corners, np.full(len(corners), modulus)) for corners in mesh.cells.values()
-        )
-    return Springs(reference, half_weight(mesh), energies)
+    energies = [AreaEnergy(mesh.points, corners, np.full(len(corners), modulus)) for corners in mesh.cells.values()]
+    return Springs(reference, half_weight(mesh), tuple(energies) if abs(modulus) > 1e-15 else ())

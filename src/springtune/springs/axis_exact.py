@@ -35,10 +35,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     nu = material.poisson_ratio
     if nu <= 0:
         raise DefinitionError("needs a Poisson's ratio above 0: without it the diagonals have no stiffness")
-    membrane = material.young_modulus * thickness
-    if len(mesh.quads):
-        return Springs(membrane, _rectangles(mesh, nu))
-    return Springs(membrane, _rows(mesh, nu))
+    rule = _rectangles if len(mesh.quads) else _rows
+    return Springs(material.young_modulus * thickness, rule(mesh, nu))
 
 
 def _rectangles(mesh: Mesh, nu: float) -> np.ndarray:

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from ..mesh.cells import DIAGONALS, SIDES, Mesh, signed_areas
-from ..problem.materials import AnyMaterial, Material
+from ..problem.materials import AnyMaterial
 from .base import Springs, definition, membrane_stiffness
 
 
@@ -22,11 +22,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
 
     Source: Natsupakpong and Cavusoglu, Graph. Models 72:61, 2010 (abstract, derived).
     """
-    if isinstance(material, Material):
-        nu = material.poisson_ratio
-        elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
-    else:
-        elasticity = material.plane_stress / membrane_stiffness(material, 1.0)
+    elasticity = material.plane_stress / membrane_stiffness(material, 1.0)
     parts = {}
     for count, corners in mesh.cells.items():
         here = mesh.points[corners] - mesh.points[corners[:, :1]]

@@ -70,9 +70,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
             raise DefinitionError(_negative(reference * constants, math.sqrt(ratio.max())))
     # What is nothing but rounding is no spring.
     sides, others = (np.maximum(part, 0.0) for part in (sides, others))
-    energies: tuple[AreaEnergy, ...] = ()
-    if np.abs(moduli).max() > 1e-15:
-        energies = (AreaEnergy(mesh.points, mesh.quads, moduli),)
+    energies = (AreaEnergy(mesh.points, mesh.quads, moduli),) if np.abs(moduli).max() > 1e-15 else ()
     return Springs(reference * thickness, from_rectangles(mesh, sides, others, diagonals), energies)
 
 

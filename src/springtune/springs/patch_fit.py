@@ -73,12 +73,11 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     triangles_only(mesh)
     held = tested_body(mesh)
     start = van_gelder.springs(mesh, material, thickness).relative
-    forces = outline_tests(mesh)
+    forces, _ = polynomial_tests(mesh)
     first, second = np.triu_indices(len(forces))
     # Entries beside the diagonal stand for two.
     twice = np.where(first == second, 1.0, np.sqrt(2.0))
     logarithms, network, evaluations = np.zeros(len(start)), None, 0
-    weight = CHANGE_WEIGHT / len(start)
     while evaluations < STEPS:
         evaluations += 1
         network = Network(mesh, held, start * np.exp(logarithms), like=network)
@@ -88,12 +87,10 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         pulled = [(normals * network.end_differences(network.expand(field))).sum(axis=1) for field in moved]
         elongations = np.sqrt(network.stiffness)[:, None] * np.stack(pulled, axis=1)
         slope = -twice * elongations[:, first] * elongations[:, second]
-        missing = (
-            twice * (np.eye(len(forces)) - np.array(loads) @ np.array(moved).T)[first, second]
-        ) + slope.T @ logarithms
+        misfit = twice * (np.eye(len(forces)) - np.array(loads) @ np.array(moved).T)[first, second]
         normal = slope.T @ slope
-        normal[np.diag_indices(len(normal))] += weight
-        change = slope @ np.linalg.solve(normal, missing) - logarithms
+        normal[np.diag_indices(len(normal))] += CHANGE_WEIGHT / len(start)
+        change = slope @ np.linalg.solve(normal, misfit + slope.T @ logarithms) - logarithms
         largest = np.abs(change).max()
         logarithms += change * min(1.0, LARGEST_STEP / largest)
         if largest < ENOUGH:
@@ -101,19 +98,14 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     return Springs(material.young_modulus * thickness, start * np.exp(logarithms), evaluations=evaluations)
 
 
-def outline_tests(mesh: Mesh) -> np.ndarray:
-    """Return forces on the particles of at most `TESTS` tests with polynomial stresses, (n_tests, n_points, 2).
-
-    For E t = 1; times the square root of E t they are in N, with a work of 1 J on their own displacements and 0 on
-    others'.
-    """
-    return polynomial_tests(mesh)[0]
-
-
 def polynomial_tests(
     mesh: Mesh, nu: float = NU, degrees: range = range(1, TEST_DEGREE + 1)
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return forces as `outline_tests`, and displacements of the particles that are polynomials of some `degrees`."""
+    """Return forces of at most `TESTS` tests with polynomial stresses, and displacements of some `degrees`.
+
+    Both are (n_tests, n_points, 2), for E t = 1. Times the square root of E t the forces are in N, with a work of 1 J
+    on their own displacements and 0 on others'.
+    """
     x, y = (mesh.points - mesh.points.mean(axis=0)).T
     places = (x + 1j * y) / np.hypot(x, y).max()
     # Sides of triangles run counter-clockwise around them: those of the outline have the sheet on their left.

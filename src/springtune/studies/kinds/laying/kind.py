@@ -1,12 +1,10 @@
 """Strips laid on a trapezoid: every combination of the values of a study's section ``laying``."""
 
-from dataclasses import asdict
 from itertools import product
 from typing import Annotated
 
 from pydantic import Field
 
-from springtune.problem.shapes import Strip, Trapezoid
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
@@ -100,10 +98,10 @@ def _check(config, problems):
 def _expand(config, declared):
     """Labels and values of network strips, and of finite-element strips to compare with."""
     section = config.laying
-    beam, base = declared.beams[section.strip], section.trapezoid
+    beam = declared.beams[section.strip]
     shared = {
-        "strip": asdict(Strip(beam.length, beam.height, beam.thickness)),
-        "trapezoid": asdict(Trapezoid(base.lower_base, base.upper_base, base.height)),
+        "strip": {"length": beam.length, "height": beam.height, "thickness": beam.thickness},
+        "trapezoid": section.trapezoid.model_dump(),
         "material": material_key(declared.materials[section.material]),
         "support": material_key(declared.materials[section.support]),
         "pressure": section.pressure,

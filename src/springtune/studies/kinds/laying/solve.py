@@ -13,6 +13,7 @@ A trapezoid far stiffer than the strip is rigid: it has no unknowns, like the fl
 """
 
 import time
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,12 +24,32 @@ from springtune.mesh.cells import MESH_TYPES, Mesh
 from springtune.problem.compare import band
 from springtune.problem.materials import material_of
 from springtune.problem.quantities import Status
-from springtune.problem.shapes import Strip, Trapezoid
+from springtune.problem.shapes import Beam
 from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
 RIGID_MODULUS_RATIO = 1e4
 """Ratio of Young's moduli above which the trapezoid is rigid."""
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """Symmetric trapezoid on its lower base; lengths in m."""
+
+    lower_base: float
+    upper_base: float
+    height: float
+
+    @property
+    def area(self) -> float:
+        """Area [m2]."""
+        return 0.5 * (self.lower_base + self.upper_base) * self.height
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """Corners, counter-clockwise, the axis at x = 0: pairs of x and y [m]."""
+        low, high = 0.5 * self.lower_base, 0.5 * self.upper_base
+        return [(-low, 0.0), (low, 0.0), (high, self.height), (-high, self.height)]
 
 
 def solve(task):
@@ -50,7 +71,7 @@ def solve(task):
 
 def _strip_result(task, size):
     made = {
-        "strip": Strip(**task["strip"]),
+        "strip": Beam(**task["strip"]),
         "trapezoid": Trapezoid(**task["trapezoid"]),
         "material": material_of(task["material"]).in_plane,
         "support": material_of(task["support"]).in_plane,
