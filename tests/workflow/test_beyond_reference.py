@@ -104,9 +104,9 @@ def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
         assert root.reference_message.item() == f"no reference: {lost}"
         assert (root.reference_applies == 0).all() and (root.status == 1).all()
         assert (root.message == f"no reference: {lost}").all()
-        written = present.write_page(tree, tmp_path)
+        present.write_page(tree, tmp_path)
     assert f"no reference: {lost}" in (tmp_path / "index.html").read_text()
-    rows = csv.DictReader((tmp_path / written[0]).read_text().splitlines())
+    rows = csv.DictReader(min(tmp_path.glob("bending_*.csv")).read_text().splitlines())
     applies = {(row["beam"], row["kinematics"]): row["reference_applies"] for row in rows}
     # Nonlinear networks have a reference of their own, at finite strain.
     assert [place for place, said in applies.items() if said == "no"] == [("other", "linear")]

@@ -139,7 +139,7 @@ def lines_of(folder):
 
 
 def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
-    assert write_page(scenes(), tmp_path)[-1] == "index.html"
+    write_page(scenes(), tmp_path)
     html, lines = lines_of(tmp_path)
     found = [line for line in lines if "nonlinear" in line or "linear" in line]
     compression, traction = found[:2], found[2:]

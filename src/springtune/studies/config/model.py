@@ -301,7 +301,7 @@ class Output:
     plot: str = ""  # function that yields stem, plotting function and selection of each figure of a tree
     job: str = "further"  # outputs share a job, which starts and opens the dataset in as much time as ten figures take
     tables: Callable[[Study], Iterable[str]] = lambda study: []  # file names
-    write: str = ""  # function of a tree and a folder that writes the tables and returns their names
+    write: str = ""  # function of a tree and a folder that writes the tables
     into: str = "tables"  # folder of the tables
     page: bool = False  # whether it is the page of all tables
     draw: Callable[[Any, Any], object] | None = None  # draws its group of the dataset on Axes: one figure, one panel

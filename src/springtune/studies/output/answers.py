@@ -25,6 +25,11 @@ def variables(data: "xr.Dataset") -> Variables:
     return {str(name): ([*map(str, array.dims)], array.values) for name, array in data.variables.items()}
 
 
+def plane_vectors(fields: "xr.Dataset", name: str) -> np.ndarray:
+    """Vectors in the plane from their components, such as ``"displacement_{}"``, shape (n, 2)."""
+    return np.stack([fields[name.format(axis)].values for axis in "xy"], axis=1)
+
+
 def broadcast(dims: Sequence[str], own: Sequence[str], values: np.ndarray) -> np.ndarray:
     """Values over their `own` dimensions with an axis for each of `dims`, of length 1 where they have none."""
     values = values.transpose([own.index(name) for name in dims if name in own])

@@ -96,7 +96,7 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
     loader = jinja2.PackageLoader("springtune.studies.output", "assets")
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
-    environment.filters |= FILTERS
+    environment.filters |= {"size": _size, "stiffnesses": _stiffnesses, "error": error_text}
     return environment.get_template("page.html").render(
         title=attributes.get("title") or attributes.get("study") or "Study",
         policy=f"{policy}; form-action 'none'",
@@ -452,10 +452,6 @@ def _stiffnesses(values: np.ndarray) -> str:
     return re.sub(r"e\+0?", "e", range_text(values)) + " N/m"
 
 
-FILTERS = {"size": _size, "stiffnesses": _stiffnesses, "error": error_text}
-"""Filters of the template."""
-
-
 def _dots(found: Sequence[DefinitionErrors], percents: np.ndarray, labels: np.ndarray, errors: np.ndarray) -> Chart:
     """Errors of each definition: medians by label, of all, and the worst."""
     x, dots, rows = Axis(ERROR_AXIS, percents[np.concatenate([one.places for one in found])], log=True), [], []
@@ -497,37 +493,31 @@ def _curves(curves: Variables) -> Content:
     """Charts of the error over k / (E t), one for each mesh type, material and load: nonlinear where there is one."""
     dims, errors = curves["deformation_error"]
     labels = {name: curves[name][1].tolist() for name in dims}
+    ratios = curves["stiffness_ratio"][1]
     panels: dict[tuple[str, ...], list[tuple[Content, tuple[int, ...]]]] = {}
     for place in map(tuple, np.argwhere(np.isfinite(errors).any(axis=-1))):
         cell = {name: labels[name][at] for name, at in zip(dims, place)}
         panels.setdefault(tuple(cell[name] for name in PANEL_LABELS), []).append((cell, place))
     shown = [panel for panel in panels if panel[-1] == "nonlinear" or (*panel[:-1], "nonlinear") not in panels]
     looks = {_size(size): number % LOOKS for number, size in enumerate(labels["mesh_size"])}
-    x, charts = Axis("k / (E t)", curves["stiffness_ratio"][1]), []
+    x, charts = Axis("k / (E t)", ratios), []
     for panel in shown[:MOST_PANELS]:
         lines, dots, members = [], [], panels[panel]
         for cell, place in members[:MOST_LINES]:
-            size = _size(cell["mesh_size"])
-            points, marks = _curve(curves, place, x)
+            size, percents = _size(cell["mesh_size"]), 100 * errors[place]
+            kept = np.abs(percents) <= LARGEST_CURVE_PERCENT
+            points = [(x.at(one), CURVE_AXIS.at(other)) for one, other in zip(ratios[kept], percents[kept])]
             lines.append((looks[size], points))
-            for name, at, stiffness in marks:
-                text = f"{cell['beam']}, {size}, {name}: {stiffness:.4g} N/m"
-                dots.append((f"{name} look{looks[size]}", at, CURVE_AXIS.at(0), text))
+            membrane = float(np.nanmedian(curves["stiffness"][1][place] / ratios))
+            for name in ("predicted", "best"):
+                stiffness = float(curves[f"{name}_stiffness"][1][place])
+                if ratios[0] <= stiffness / membrane <= ratios[-1]:
+                    text = f"{cell['beam']}, {size}, {name}: {stiffness:.4g} N/m"
+                    dots.append((f"{name} look{looks[size]}", x.at(stiffness / membrane), CURVE_AXIS.at(0), text))
         more = f"; {len(members) - MOST_LINES} curves more" if len(members) > MOST_LINES else ""
         charts.append(Chart(x, CURVE_AXIS, lines=lines, dots=dots, title=", ".join(panel) + more))
     seen = {dot[0].split()[0] for chart in charts for dot in chart.dots}
     return {"charts": charts, "names": looks, "seen": seen, "further": len(shown) - MOST_PANELS}
-
-
-def _curve(curves: Variables, place: tuple[int, ...], x: Axis) -> tuple[list[Any], list[tuple[str, float, float]]]:
-    """Points of a curve, and name, place and value of its predicted and its best stiffness."""
-    ratios, percents = curves["stiffness_ratio"][1], 100 * curves["deformation_error"][1][place]
-    kept = np.abs(percents) <= LARGEST_CURVE_PERCENT
-    points = [(x.at(one), CURVE_AXIS.at(other)) for one, other in zip(ratios[kept], percents[kept])]
-    membrane = float(np.nanmedian(curves["stiffness"][1][place] / ratios))
-    marks = [(name, float(curves[f"{name}_stiffness"][1][place])) for name in ("predicted", "best")]
-    return points, [(name, x.at(stiffness / membrane), stiffness) for name, stiffness in marks
-                    if ratios[0] <= stiffness / membrane <= ratios[-1]]  # fmt: skip
 
 
 # -- the paper's tables ------------------------------------------------------------------------------------------------
@@ -535,13 +525,12 @@ def _curve(curves: Variables, place: tuple[int, ...], x: Axis) -> tuple[list[Any
 
 def _paper_tables(cells: Columns) -> Content:
     """Tables of the paper: printed numbers, and beside them our reference and errors of definitions."""
-    printed = np.flatnonzero(np.isfinite(cells["paper_table"]))
     tables: dict[str, dict[Any, Content]] = {}
     kinematics: dict[str, str] = {}  # that of each definition which is shown: nonlinear if there is one
     for one in sorted(definition_errors(cells), key=lambda one: (one.labels[0] != "paper", one.median)):
         name, own = one.labels
         kinematics[name] = own if own == "nonlinear" else kinematics.get(name, own)
-    for place in printed:
+    for place in np.flatnonzero(np.isfinite(cells["paper_table"])):
         cell: Content = {name: values[place] for name, values in cells.items()}
         title = f"Table {cell['paper_table']:g}: {cell['load']}, {cell['mesh_type']}, {cell['material']}"
         row = tables.setdefault(title, {}).setdefault((cell["beam"], f"{1e3 * cell['mesh_size']:.4g}"), {

@@ -245,33 +245,37 @@ def _compare_variable(
     if not one.size:
         return VariableChanges(name, 0, 0, [])
     flagged = is_flagged(one) and is_flagged(other)
-    a, b = (as_words(side) if flagged else side.values for side in (one, other))
     texts = flagged or one.dtype.kind in "OUS"
+    a, b = (as_words(side) if flagged else side.values for side in (one, other))
     if flagged:
         a, b = (np.where(side == NOT_REQUESTED, "", side) for side in (a, b))
-    there = [values != "" if texts else ~np.isnan(values) for values in (a, b)]
     of_both = [mask.any([dim for dim in mask.dims if dim not in names]).broadcast_like(one) for mask in asked]
     masks = [mask.transpose(*names).values for mask in of_both]
+    points = math.prod(one.sizes[name] for name in names if name not in dimensions)
+    a, b, *masks = (values.reshape(-1, points) for values in (a, b, *masks))
+    there = [values != "" if texts else ~np.isnan(values) for values in (a, b)]
     unmatched = (there[0] != there[1]) & np.where(there[0], masks[1], masks[0])
     both = there[0] & there[1]
     differ = both & (a != b)
     excess = np.where(unmatched, np.inf, 0.0)
-    points = tuple(range(sum(name in dimensions for name in names), one.ndim))
     units = str(one.attrs.get("units", other.attrs.get("units", "1")))
     if texts:
         excess[differ] = [_excess_of_texts(str(x), str(y), tolerance.relative) for x, y in zip(a[differ], b[differ])]
     elif differ.any():
-        excess[differ] = _excess_of_numbers(a, b, both, points, units, tolerance)[differ]
-    length, value, rows = math.prod(one.shape[axis] for axis in points), str if texts else float, []
-    cells = excess.reshape(-1, length)
-    worst = cells.max(axis=1)
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            sizes = np.maximum(np.abs(a), np.abs(b))
+            size = np.where(both & np.isfinite(sizes), sizes, 0.0).max(axis=1, keepdims=True)
+            no_unit = tolerance.absolute is None and units in ("", "1")
+            absolute = tolerance.relative if no_unit else tolerance.absolute or 0.0
+            ratio = np.abs(b - a) / np.maximum(tolerance.relative * size, absolute)
+        excess[differ] = np.where(np.isfinite(ratio), ratio, np.inf)[differ]
+    worst, value, rows = excess.max(axis=1), str if texts else float, []
     changed = np.argsort(-worst, kind="stable")[: np.count_nonzero(worst > 1.0)]
-    for place in (changed * length + cells[changed].argmax(axis=1))[:most]:
-        labels = _labels(one, np.unravel_index(place, one.shape))
-        over = float(excess.flat[place])
-        rows.append(Change(group, name, labels, value(a.flat[place]), value(b.flat[place]), units, over))
-    compared = (both | unmatched).reshape(-1, length).any(axis=1).sum()
-    return VariableChanges(name, int(compared), len(changed), rows)
+    for cell in changed[:most]:
+        at = cell, excess[cell].argmax()
+        labels = _labels(one, np.unravel_index(np.ravel_multi_index(at, excess.shape), one.shape))
+        rows.append(Change(group, name, labels, value(a[at]), value(b[at]), units, float(worst[cell])))
+    return VariableChanges(name, int((both | unmatched).any(axis=1).sum()), len(changed), rows)
 
 
 def _cell_dimensions(pair: Pair, roots: Pair) -> set[str]:
@@ -300,21 +304,6 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray:
 def _labels(array: xr.DataArray, place: Iterable[int]) -> Labels:
     found = {str(name): array.indexes[name][int(at)] for name, at in zip(array.dims, place)}
     return {name: label if isinstance(label, str | int) else float(label) for name, label in found.items()}
-
-
-def _excess_of_numbers(
-    a: np.ndarray, b: np.ndarray, both: np.ndarray, points: tuple[int, ...], units: str, tolerance: Tolerance
-) -> np.ndarray:
-    """Difference over tolerance of numbers, infinite without one."""
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        size = np.maximum(np.abs(a), np.abs(b)).astype(float)
-        if points:
-            size = np.where(both & np.isfinite(size), size, 0.0).max(axis=points, keepdims=True)
-        absolute = tolerance.absolute or 0.0
-        if tolerance.absolute is None and units in ("", "1"):
-            absolute = tolerance.relative
-        ratio = np.abs(b - a) / np.maximum(tolerance.relative * size, absolute)
-    return np.where(np.isfinite(ratio), ratio, np.inf)
 
 
 def _excess_of_texts(a: str, b: str, relative: float) -> float:

@@ -74,19 +74,18 @@ class Group:
             values = np.full(shape, nothing, dtype=dtype)
             attributes: dict[str, object] = {"long_name": long_name, "units": units}
             if meanings:
-                flags = np.arange(len(meanings), dtype="int8")
-                attributes |= {"flag_values": flags, "flag_meanings": " ".join(meanings)}
+                attributes["flag_values"] = np.arange(len(meanings), dtype="int8")
+                attributes["flag_meanings"] = " ".join(meanings)
             # As it is: looking for dates among millions of texts costs more than the texts.
             data[name] = xr.Variable(dimensions, values, attributes | self.further.get(name, {}), fastpath=True)
             used |= set(dimensions)
-        described = DIMENSIONS | self.dimensions
         coordinates = {}
-        for dimension in (name for name in described if name in used):
-            words = described[dimension]
-            long_name, units = words if isinstance(words, tuple) else (words, "1")
-            values = np.array(axes[dimension])
-            values = values.astype(object) if values.dtype.kind == "U" else values
-            coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
+        for dimension, words in (DIMENSIONS | self.dimensions).items():
+            if dimension in used:
+                long_name, units = words if isinstance(words, tuple) else (words, "1")
+                values = np.array(axes[dimension])
+                values = values.astype(object) if values.dtype.kind == "U" else values
+                coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
         return xr.Dataset(data, coordinates)
 
     def of_rows(
@@ -449,14 +448,9 @@ def network(data: xr.DataTree, labels: dict[str, Label]) -> xr.Dataset:
             raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
         found = found.assign_coords({name: kept}).drop_vars(f"{SHOWN_PREFIX}{name}")
     # One network of a group may lack particles, springs, cells and corners of cells that another has.
-    for name, dimension in (
-        ("x", "particle"),
-        (SPRING_NODES, "spring"),
-        (CELL_NODES, "cell"),
-        (CELL_NODES, "cell_corner"),
-    ):
-        there = found[name].notnull()
-        found = found.isel({dimension: there.any([one for one in there.dims if one != dimension]).values})
+    needed = {"particle": "x", "spring": SPRING_NODES, "cell": CELL_NODES, "cell_corner": CELL_NODES}
+    for dimension, name in needed.items():
+        found = found.dropna(dimension, how="all", subset=[name])
     for name in (SPRING_NODES, CELL_NODES):
         connectivity = found[name].fillna(NO_NODE).astype("int32")
         connectivity.encoding = {"_FillValue": NO_NODE, "dtype": "int32"}

@@ -18,6 +18,7 @@ from springtune.safe_io import check_folder, replacing, write_text
 
 from ...registry import how_to_install
 from . import reading
+from .answers import plane_vectors
 from .dataset import CELL_NODES, SPRING_NODES, as_words, is_flagged
 from .text import cell_text
 
@@ -27,22 +28,16 @@ MOST_NUMBERS = 50_000_000
 """Most rows times columns: a table repeats the labels of all dimensions in each row."""
 
 
-class RequestError(ValueError):
-    """The request does not fit the dataset, or names an unknown format."""
-
-    wrong_call = True
-
-
 def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
     """Return a group as a table: a row for each requested cell, a column for each dimension and variable."""
     name = "/" + group.strip("/")
     known = [node.path for node in tree.subtree]
     if name not in known:
-        raise RequestError(f"--group {group}: the dataset has no such group; {nearest(name, known)}")
+        raise ValueError(f"--group {group}: the dataset has no such group; {nearest(name, known)}")
     data = tree[name].to_dataset().reset_coords()
     if not data.variables:
         others = ", ".join(node.path.strip("/") for node in tree.subtree if node.data_vars)
-        raise RequestError(f"--group {group}: the group has no variables; give one of {others}")
+        raise ValueError(f"--group {group}: the group has no variables; give one of {others}")
     rows = math.prod(data.sizes.values())
     if rows * len(data.variables) > MOST_NUMBERS:
         why = f"{rows} rows of {len(data.variables)} columns, and at most {MOST_NUMBERS} values are written"
@@ -64,7 +59,7 @@ def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False)
     ending = path.suffix.lower()
     if ending not in TABLE_ENDINGS:
         remedy = f"give a file in {' or '.join(TABLE_ENDINGS)}"
-        raise RequestError(f"{path}: '{path.suffix}' is no format to export to; {remedy}")
+        raise ValueError(f"--to {path}: '{path.suffix}' is no format to export to; {remedy}")
     check_folder(path)
     if path.exists() and not force:
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
@@ -80,12 +75,9 @@ def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False)
 
 MESH_DIMENSIONS = ("beam", "mesh_type", "mesh_size")
 
-SCENES_LIST = "scenes.csv"
-"""Table of the files, with the labels of each."""
 
-
-def write_scenes(tree: xr.DataTree, folder: Path) -> list[Path]:
-    """Write a VTU file for each scene with fields, and a table of the files."""
+def write_scenes(tree: xr.DataTree, folder: Path) -> None:
+    """Write a VTU file for each scene with fields, and a table of the files with the labels of each."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.vtu"):
         old.unlink()
@@ -98,23 +90,20 @@ def write_scenes(tree: xr.DataTree, folder: Path) -> list[Path]:
         name = cell_text(labels, units).replace(", ", "_").replace(" ", "") + ".vtu"
         _write_scene(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", "")} | labels)
         rows.append({"file": name} | labels)
-    write_text(folder / SCENES_LIST, pd.DataFrame(rows, columns=["file", *units]).to_csv(index=False))
-    return [Path(SCENES_LIST)]
+    write_text(folder / "scenes.csv", pd.DataFrame(rows, columns=["file", *units]).to_csv(index=False))
 
 
 def _write_scene(path: Path, network: xr.Dataset, labels: Mapping[str, object]) -> None:
     """Write a network: particles with displacements, springs as lines, cells; all in SI units."""
-
-    def vectors(names: str) -> np.ndarray:
-        return np.stack([network[names.format(axis)].values for axis in "xy"], axis=1)
-
     network = network.squeeze([name for name in labels if name in network.dims])  # a mesh may be of one cell
     corners = network[CELL_NODES].transpose("cell", ...).values
     cells = {2: network[SPRING_NODES].transpose("spring", ...).values}
     cells |= {count: corners[(corners >= 0).sum(axis=1) == count][:, :count] for count in (3, 4)}
-    points = {"displacement": vectors("displacement_{}")}
-    expected = vectors("particle_reference_{}") if "particle_reference_x" in network else np.array(np.nan)
+    points = {"displacement": plane_vectors(network, "displacement_{}")}
+    expected = (
+        plane_vectors(network, "particle_reference_{}") if "particle_reference_x" in network else np.array(np.nan)
+    )
     if np.isfinite(expected).all():
         points |= {"reference_displacement": expected, "error": points["displacement"] - expected}
     springs = {"stiffness": {2: network.stiffness.values}, "force": {2: network.spring_force.values}}
-    write_vtu(path, vectors("{}"), cells, points, springs, {}, json.dumps(labels, indent=1))
+    write_vtu(path, plane_vectors(network, "{}"), cells, points, springs, {}, json.dumps(labels, indent=1))

@@ -1,7 +1,7 @@
 """Make a study's outputs: figures in PNG and PDF files, and tables, each as CSV and all on one page."""
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,15 +15,14 @@ from springtune.safe_io import write_bytes, write_json, write_text
 from ..config.model import Output, modules, outputs
 from . import reading
 from .dataset import sign_of_errors
-from .text import csv_text, decimals, number
+from .text import decimals, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
-    """Draw the figures of outputs into ``folder/figures``, and write their other files."""
-    made: list[Path] = []
+def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
+    """Draw the figures of outputs into ``folder/figures``, write their other files, and the record of it."""
     with reading.open(dataset) as tree:
         width, font_size = (float(tree.attrs.get(f"figure_{name}") or 0) for name in ("width", "font_size"))
         if width or font_size:
@@ -31,23 +30,17 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
 
             style.choose(width, font_size)
         for output in (outputs(*names)[name] for name in names):
-            if output.module:
-                made += _draw(output, tree, Path(folder) / "figures")
             into = Path(folder) / output.into
+            if output.module:
+                _draw(output, tree, Path(folder) / "figures")
             if output.page:
-                made += [into / name for name in write_page(tree, into)]
+                write_page(tree, into)
             if output.write:
-                made += [into / name for name in import_name(output.write)(tree, into)]
-    return made
-
-
-def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
-    """Make outputs and write the record of it."""
-    run(dataset, folder, *names)
+                import_name(output.write)(tree, into)
     write_json(record, {"digest": digest})
 
 
-def _draw(output: Output, tree: xr.DataTree, folder: Path) -> Iterator[Path]:
+def _draw(output: Output, tree: xr.DataTree, folder: Path) -> None:
     import matplotlib.pyplot as plt
 
     from . import style
@@ -58,7 +51,6 @@ def _draw(output: Output, tree: xr.DataTree, folder: Path) -> Iterator[Path]:
         figure = np.ravel(plot(tree, **selection))[0].figure
         for ending, content in style.png_and_pdf(figure).items():
             write_bytes(folder / f"{stem}.{ending}", content)
-            yield folder / f"{stem}.{ending}"
         plt.close(figure)
 
 
@@ -80,15 +72,15 @@ MOST_ROWS = 1000
 COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa", "ms": "ms"}
 
 
-def write_page(tree: xr.DataTree, folder: str | Path) -> list[str]:
+def write_page(tree: xr.DataTree, folder: Path) -> None:
     """Write a CSV file for each table, and a page with all."""
     known = (name for name in modules("tables", "figures") if name.split(".")[2] in ("bodies", *tree.children))
     found = (getattr(import_name(name), "tables", None) for name in known)
     tables = [table for of_kind in found if of_kind for table in of_kind(tree)]
-    written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables} | {"index.html": html(tables, tree)}
-    for name, text in written.items():
-        write_text(Path(folder) / name, text)
-    return list(written)
+    for table in tables:  # missing numbers are empty
+        text = pd.DataFrame(table["rows"]).to_csv(index=False, float_format="%.8g", lineterminator="\n")
+        write_text(folder / f"{table['stem']}.csv", text)
+    write_text(folder / "index.html", html(tables, tree))
 
 
 def html(tables: Iterable[Mapping[str, Any]], tree: xr.DataTree) -> str:

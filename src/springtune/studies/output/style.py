@@ -24,7 +24,7 @@ from matplotlib.ticker import NullLocator
 from springtune.problem.compare import sign_sentence
 from springtune.problem.quantities import Status
 
-from .answers import ERROR_COLOURS, ERROR_RANGE
+from .answers import ERROR_COLOURS, ERROR_RANGE, plane_vectors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -344,9 +344,8 @@ def small_multiples(
         place: dict[str, Any] = {"loc": "outside upper right", "ncols": len(key)} if figure else {}
         (figure or flat[-1]).legend(handles=key, **place)
     if ax is None and isinstance(figure, Figure):
-        figure.set_size_inches(
-            wide, 0.2 + (height + line_height * lines) * rows + line_height * (bool(said) + bool(key))
-        )
+        tall = 0.2 + (height + line_height * lines) * rows
+        figure.set_size_inches(wide, tall + line_height * (bool(said) + bool(key)))
     return flat
 
 
@@ -439,11 +438,6 @@ def error_text(error: float, sign: str = "+") -> str:
     """Format an error [%] for a cell of a heat map."""
     size = abs(error)
     return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
-
-
-def plane_vectors(fields: "xr.Dataset", name: str) -> np.ndarray:
-    """Vectors in the plane from their components, such as ``"displacement_{}"``, shape (n, 2)."""
-    return np.stack([fields[name.format(axis)].values for axis in "xy"], axis=1)
 
 
 def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from ..runs.plan import DATASET, PAGE, PAPER_FILE, SUMMARY, Job
 from ..runs.source import RECORDS, read_note
 from . import reading
 from .answers import Columns, Variables, definition_errors, own_laws, requested_cells, variables, what_to_type
-from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, place_text, range_text, without_numbers
+from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, range_text, without_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,15 +31,8 @@ CELLS_NAMED = 3
 DEFINITIONS_LISTED = 8
 """Most definitions with a worst error."""
 
-ROOT_GROUP = "/"
-
-COMPARED = {"": ("deformation_error", "reference_displacement"), "shapes": ("error", "reference_value")}
+COMPARED = {"/": ("deformation_error", "reference_displacement"), "/shapes": ("error", "reference_value")}
 """Error and reference of groups whose definitions are compared."""
-
-
-FINITE_STRAIN_GROUP = "/finite_strain"
-"""Group of references for nonlinear kinematics."""
-
 
 COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "reference_message"}
 """Variables of groups that compare scenes with small-strain references."""
@@ -50,13 +43,16 @@ def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFI
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(count), said] for what, count, said, _ in states if count]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
-    for name, data in groups.items():
-        if name.strip("/") in COMPARED:
-            finite = groups.get(FINITE_STRAIN_GROUP) if name == ROOT_GROUP else None
-            lines += _answers(data, finite, most, *COMPARED[name.strip("/")])
+    for name, (error, reference) in COMPARED.items():
+        if name in groups and "definition" in groups[name].get(error, groups[name]).dims:
+            finite = variables(groups["/finite_strain"]) if name == "/" and "/finite_strain" in groups else {}
+            cells = requested_cells(variables(groups[name]), finite, error)
+            lines += _errors(cells, groups[name][error], cells[reference], finite, most)
+            if name == "/":  # of shapes quantities have errors
+                lines += _stiffness_to_type(cells)
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
-            lines += _lines_on_references(data, "scenes" if name == ROOT_GROUP else name.strip("/"))
+            lines += _lines_on_references(data, "scenes" if name == "/" else name.strip("/"))
     holes = []
     for what, count, _, lost in states:
         for status, cells in lost.items():
@@ -83,13 +79,19 @@ def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, Mapp
             one: _cells(data, variable.dims, at, messages) for one, at in places.items() if one != Status.SOLVED
         }
         part = label.removesuffix("status").strip("_").replace("_", " ")
-        what = "scenes" if name == ROOT_GROUP else ", ".join(filter(None, (name.strip("/"), part)))
+        what = "scenes" if name == "/" else ", ".join(filter(None, (name.strip("/"), part)))
         said = ", ".join(f"{at.sum()} {_words(status)}" for status, at in places.items())
         yield what, sum(int(at.sum()) for at in places.values()), said, lost
 
 
 def _cells(data: "xr.Dataset", dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
-    return [(place_text(data, dims, place), str(messages[tuple(place)])) for place in np.argwhere(there)]
+    """Labels and messages of some cells."""
+    units = {str(name): str(data[name].attrs.get("units", "1")) for name in dims if name in data.coords}
+    labels = {str(name): data[name].values if name in data.coords else range(data.sizes[name]) for name in dims}
+    return [
+        (cell_text({name: labels[name][at] for name, at in zip(labels, place)}, units), str(messages[tuple(place)]))
+        for place in np.argwhere(there)
+    ]
 
 
 def _words(status: Status) -> str:
@@ -108,27 +110,15 @@ def _cell_lines(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - named} more"
 
 
-def _answers(
-    data: "xr.Dataset", finite: "xr.Dataset | None", most: int | None, error: str, reference: str
-) -> Iterator[str]:
-    """Errors of definitions, and what to type."""
-    if "definition" in data.get(error, data).dims:
-        other = None if finite is None else variables(finite)
-        cells = requested_cells(variables(data), other, error)
-        yield from _errors(cells, data[error], cells[reference], other, most)
-        if error == "deformation_error":  # of shapes quantities have errors
-            yield from _stiffness_to_type(cells)
-
-
 def _errors(
-    cells: Columns, error: "xr.DataArray", reference: np.ndarray, finite: Variables | None, most: int | None
+    cells: Columns, error: "xr.DataArray", reference: np.ndarray, finite: Variables, most: int | None
 ) -> Iterator[str]:
     """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
     found = sorted(definition_errors(cells), key=lambda one: -one.errors.max())
     if found:
         what = str(error.name).replace("_", " ")
         yield from ("", f"{what}s, (network - reference) / |reference|, of solved scenes within the reference")
-        if finite is not None and own_laws(finite):
+        if own_laws(finite):
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         by = [name for name in ("definition", "kinematics") if name in cells]
         others = [str(name) for name in error.dims if name not in by]
@@ -214,16 +204,12 @@ def info(path: str | os.PathLike[str]) -> Info:
     (True, True)
     """
     with reading.open(path) as tree, reading.guarded(path):
-        return Info(info_text(tree, reading.dataset_file(path)))
-
-
-def info_text(tree: "xr.DataTree", path: Path) -> str:
-    """Content of a dataset as text."""
-    made = f", made {tree.attrs['created']}" if "created" in tree.attrs else ""
-    study = tree.attrs.get("study", "unknown")
-    head = [tree.attrs.get("title", study), f"study {study}: {path}, {bytes_text(path.stat().st_size)}{made}"]
-    cells = text({node.path: node.to_dataset() for node in tree.subtree}, "", None).strip("\n")
-    return "\n\n".join(filter(None, [paragraphs([head]), cells, paragraphs([_groups(tree), _provenance(tree)])]))
+        file, study = reading.dataset_file(path), tree.attrs.get("study", "unknown")
+        made = f", made {tree.attrs['created']}" if "created" in tree.attrs else ""
+        head = [tree.attrs.get("title", study), f"study {study}: {file}, {bytes_text(file.stat().st_size)}{made}"]
+        cells = text({node.path: node.to_dataset() for node in tree.subtree}, "", None).strip("\n")
+        parts = paragraphs([head]), cells, paragraphs([_groups(tree), _provenance(tree)])
+        return Info("\n\n".join(filter(None, parts)))
 
 
 def _groups(tree: "xr.DataTree") -> list[str]:

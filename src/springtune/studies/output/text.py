@@ -1,17 +1,13 @@
-"""Texts of numbers, labels and tables: for a terminal and CSV files."""
+"""Texts of numbers, labels and tables."""
 
 import json
 import math
 import re
-from collections.abc import Hashable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, SupportsFloat
+from collections.abc import Iterable, Mapping
+from typing import Any, SupportsFloat
 
 from springtune.problem.quantities import SWEPT, with_unit
 from springtune.safe_io import number_text, shown
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 NOT_ALL_SOLVED = "Not everything is solved"
 """How the last line of a dataset's summary begins where scenes are not solved."""
@@ -49,13 +45,6 @@ def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
     return ", ".join(label_text(name, label, units.get(name, "1")) for name, label in labels.items())
 
 
-def place_text(data: "xr.Dataset", dims: Iterable[Hashable], place: Iterable[int]) -> str:
-    """Labels of a cell of a dataset for readers, by its place along each dimension."""
-    places = {str(name): int(at) for name, at in zip(dims, place)}
-    units = {name: str(data[name].attrs.get("units", "1")) for name in places if name in data.coords}
-    return cell_text({name: data[name].values[at] if name in units else at for name, at in places.items()}, units)
-
-
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
 
 
@@ -84,13 +73,6 @@ def range_text(values: Iterable[float]) -> str:
 
 
 # -- tables ------------------------------------------------------------------------------------------------------------
-
-
-def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
-    """Rows as CSV; missing numbers are empty."""
-    import pandas as pd  # here: a plan does without it
-
-    return pd.DataFrame(rows).to_csv(index=False, float_format="%.8g", lineterminator="\n")
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:

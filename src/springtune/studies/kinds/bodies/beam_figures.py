@@ -12,6 +12,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from ...config.model import distinct
 from ...output import style
+from ...output.answers import plane_vectors
 from ...output.dataset import (
     at,
     cells,
@@ -24,7 +25,7 @@ from ...output.dataset import (
     shown_swept,
     sign_of_errors,
 )
-from ...output.style import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, plane_vectors, status_words
+from ...output.style import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, status_words
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .tables import like_with_like
 

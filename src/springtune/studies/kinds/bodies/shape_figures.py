@@ -6,6 +6,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from springtune.safe_io import no_mathematics
 
 from ...output import style
+from ...output.answers import plane_vectors
 from ...output.dataset import STATUS, cells, choose, group, labels_of
 from .outputs import ERRORS_STEM, shape_figures
 
@@ -285,7 +286,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    places = np.concatenate([style.plane_vectors(case, "{}"), style.plane_vectors(case, "outline_{}")])
+    places = np.concatenate([plane_vectors(case, "{}"), plane_vectors(case, "outline_{}")])
     width, height = style.extent(places, (1.0, 1.0))
     columns = min(NETWORKS_IN_ROW, len(wanted))
     wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
