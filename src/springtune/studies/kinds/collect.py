@@ -43,21 +43,17 @@ def group_of(kind: StudyKind) -> dataset.Group:
     return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions, kind.flags)
 
 
-def _groups_of_tasks(kind: StudyKind, study: Study, folder: Path) -> dict[str, xr.Dataset]:
-    """Group of such a kind, from the stored rows of its stages."""
-    group, found = group_of(kind), [row for stage in kind.stages for row in plan.rows(stage, study, folder)]
-    names = {name for row in found for name in row} if kind.sparse else None
-    return {group.name: group.of_rows(study.axes, found, names).assign_attrs(kind.attributes(study.parts[kind.name]))}
-
-
 def groups_of_study(study: Study, folder: Path) -> dict[str, xr.Dataset]:
     """Groups of the dataset of a study by name."""
     groups: dict[str, xr.Dataset] = {}
     for kind in filter(lambda kind: study.parts[kind.name], kinds()):
-        if kind.variables:
-            groups |= _groups_of_tasks(kind, study, folder)
-        else:
+        if not kind.variables:
             groups |= import_name(f"studies.kinds.{kind.name}.collect").groups(study, folder)
+            continue
+        rows = [row for stage in kind.stages for row in plan.rows(stage, study, folder)]
+        names = {name for row in rows for name in row} if kind.sparse else None
+        data = group_of(kind).of_rows(study.axes, rows, names)
+        groups[f"/{kind.name}"] = data.assign_attrs(kind.attributes(study.parts[kind.name]))
     for made in outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= import_name(made.collect).groups(study, folder)

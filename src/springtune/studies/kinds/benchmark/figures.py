@@ -17,14 +17,6 @@ FIRST_NAMED = ("delingette/structured", "van-gelder/structured", "area/braced", 
 RING_STYLE = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
 
 
-def named_approaches(data):
-    """Choose approaches to name: those of `FIRST_NAMED` with an error, then the most accurate others that fit."""
-    smallest = np.abs(data.error).min([name for name in data.error.dims if name != "approach"]).to_series()
-    there = smallest.dropna().sort_values(kind="stable").index.tolist()
-    chosen = [name for name in FIRST_NAMED if name in there]
-    return list(dict.fromkeys([*chosen, *there]))[: len(FIRST_NAMED)]
-
-
 def benchmark(tree):
     """Yield the figure of each scene: stem, plot function and selection."""
     for scene in group(tree, "benchmark").scene.values.tolist():
@@ -70,7 +62,9 @@ def plot_benchmark(data, ax=None, *, scene=None):
     missing = ", ".join(f"{count} {word}" for word, count in counts.items())
     lost = "; ".join(filter(None, (ringed, missing and f"not drawn: {missing}")))
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 4.0))
-    shown = named_approaches(case)
+    smallest = np.abs(case.error).min("mesh_size").to_series().dropna().sort_values(kind="stable")
+    named = [name for name in FIRST_NAMED if name in smallest.index]
+    shown = list(dict.fromkeys([*named, *smallest.index]))[: len(FIRST_NAMED)]
     for ring, approach in zip(rings, map(str, case.approach.values)):
         here = case.sel(approach=approach)
         errors, seconds = 100 * np.abs(here.error.values), here.seconds.values

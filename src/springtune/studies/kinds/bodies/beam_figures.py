@@ -187,6 +187,12 @@ def swept_words(values):
     return found
 
 
+def _beam_title(root, name, values):
+    """Title of a beam with its swept values."""
+    own = {one: value.sel(beam=name) for one, value in values.items()}
+    return ", ".join([labelled_beam(root, name), *swept_words(own)])
+
+
 def title_labels(selection, *names):
     """Labels of a selection for a title."""
     found = [str(selection[name]) for name in names if name in selection]
@@ -214,10 +220,8 @@ def in_usual_kinematics(root):
     whole, names = usual_kinematics(present), labels_of(present, "definition")
     own = [usual_kinematics(present.sel(definition=name)) for name in names]
     labels = [name if kinematics == whole else f"{name}, {kinematics}" for name, kinematics in zip(names, own)]
-    pairs = {
-        name: xr.DataArray(values, dims="definition") for name, values in (("definition", names), ("kinematics", own))
-    }
-    return root.sel(pairs).drop_vars("kinematics").assign_coords(definition=labels), whole
+    root = root.sel(definition=xr.Variable("definition", names), kinematics=xr.Variable("definition", own))
+    return root.drop_vars("kinematics").assign_coords(definition=labels), whole
 
 
 # -- deformed networks -------------------------------------------------------------------------------------------------
@@ -282,10 +286,8 @@ def plot_deformed(
     chosen = {one: selection[one] for one in ("material", "load")}
     values = {name: value.sel(chosen) for name, value in values.items()}
     cut = at(cut, values)
-    shown = {}
-    for name in beams:
-        words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
-        shown[", ".join(words)] = fields.sel(beam=name).sel(chosen), cut.sel(beam=name)
+    fields = fields.sel(chosen)
+    shown = {_beam_title(root, name, values): (fields.sel(beam=name), cut.sel(beam=name)) for name in beams}
     extents = [extent(plane_vectors(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
     height = max(float(np.clip((style.PAGE_WIDTH - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
@@ -323,38 +325,29 @@ MOST_DEFINITIONS_IN_PANEL = 6
 """Most definitions in one panel."""
 
 
-def title_of_errors(root, selection):
-    """Title of a figure of errors."""
-    words = title_labels(selection, "mesh_type", "material", "load")
-    finite = "finite_strain" in root.attrs and selection["kinematics"] != "linear"
-    mixed = any(str(name).endswith(", linear") for name in root.definition.values)
-    against = "against finite strain" + (" (linear: small strain)" if mixed else "")
-    return ", ".join([*words, *([against] if finite else [])])
-
-
-def _line_styles(root):
-    return {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
-
-
-def _panels_of(words, present):
-    """Definitions of each panel by its title, at most `MOST_DEFINITIONS_IN_PANEL`."""
-    asked = labels_of(present, "definition")
-    parts = np.array_split(asked, -(-len(asked) // MOST_DEFINITIONS_IN_PANEL))
-    titles = (
-        [f"{words}, {number} of {len(parts)}" for number in range(1, len(parts) + 1)] if len(parts) > 1 else [words]
-    )
-    return dict(zip(titles, map(np.ndarray.tolist, parts)))
-
-
-def _draw_panels(ax, shown, draw, title, sign):
-    """Draw a panel of deformation errors a title; `draw` gets a panel and its part, and returns notes."""
+def _draw_panels(ax, root, selection, beams, draw):
+    """Draw deformation errors of beams by their titles; `draw` gets a panel, errors and line styles; returns notes."""
+    looks, shown = {}, {}
+    for number, name in enumerate(labels_of(root.status != 0, "definition")):
+        looks[name] = style.line(number)
+    for words, here in beams.items():
+        asked = labels_of(here.status != 0, "definition")
+        parts = np.array_split(asked, -(-len(asked) // MOST_DEFINITIONS_IN_PANEL))
+        for number, part in enumerate(parts, 1):
+            title = f"{words}, {number} of {len(parts)}" if len(parts) > 1 else words
+            shown[title] = here, {name: looks[name] for name in part.tolist()}
+    title = title_labels(selection, "mesh_type", "material", "load")
+    if "finite_strain" in root.attrs and selection["kinematics"] != "linear":
+        mixed = any(str(name).endswith(", linear") for name in root.definition.values)
+        title.append("against finite strain" + " (linear: small strain)" * mixed)
 
     def drawn(panel, part):
         panel.set_ylabel("Deformation error [%]")
         said = draw(panel, *part)
         return said, f"no errors: {'; '.join(said)}"
 
-    return style.small_multiples(ax, shown, 2 if len(shown) == 4 else 3, 2.1, title, drawn, sharey=True, said=sign)
+    columns, said = 2 if len(shown) == 4 else 3, sign_of_errors(root)
+    return style.small_multiples(ax, shown, columns, 2.1, ", ".join(title), drawn, sharey=True, said=said)
 
 
 def _draw_lines(panel, places, here, looks, listed, gaps):
@@ -423,16 +416,10 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     ('Mesh size [mm]', 'Deformation error [%]')
     """
     root, beams, selection = by_beam(like_with_like(data), beam, mesh_type, material, load, kinematics)
-    looks = _line_styles(root)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
-    shown = {}
-    for name in beams:
-        here = root.sel(beam=name)
-        words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
-        parts = _panels_of(", ".join(words), here.status != 0)
-        shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
-    return _draw_panels(ax, shown, _draw_over_sizes, title_of_errors(root, selection), sign_of_errors(root))
+    shown = {_beam_title(root, name, values): root.sel(beam=name) for name in beams}
+    return _draw_panels(ax, root, selection, shown, _draw_over_sizes)
 
 
 def _draw_over_sizes(panel, here, looks):
@@ -524,16 +511,9 @@ def plot_sweep(
     needed = "status", "deformation_error", "reference_applies", "reference_displacement", "beam_length", "beam_height"
     root = root[[name for name in needed if name in root]]
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
-    looks = _line_styles(root)
     several = [name for name in beams if _most_values((root.status != 0).sel(beam=[name]), parameter) > 1]
-    shown = {}
-    for name in several or beams:
-        here = _errors_of_beam(root, name, parameter, mesh_size)
-        parts = _panels_of(here.attrs["words"], here.status != 0)
-        shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
-
-    draw = partial(_draw_over_values, parameter=parameter)
-    return _draw_panels(ax, shown, draw, title_of_errors(root, selection), sign_of_errors(root))
+    shown = dict(_errors_of_beam(root, name, parameter, mesh_size) for name in several or beams)
+    return _draw_panels(ax, root, selection, shown, partial(_draw_over_values, parameter=parameter))
 
 
 def _most_values(present, parameter):
@@ -542,7 +522,7 @@ def _most_values(present, parameter):
 
 
 def _errors_of_beam(root, name, parameter, mesh_size):
-    """Errors of a beam over a parameter and definitions; the attribute `words` is the panel's title."""
+    """Title of a beam, and its errors over a parameter and definitions."""
     here = root.sel(beam=name)
     present = (here.status != 0).any("definition")
     if mesh_size is not None:
@@ -559,7 +539,7 @@ def _errors_of_beam(root, name, parameter, mesh_size):
         here, meshes = here.sel(mesh_size=size), f"mesh {1e3 * size:g}\u00a0mm"
     values = last_swept(here.status != 0, parameter)
     words = ", ".join([labelled_beam(root, name), meshes, *swept_words(values)])
-    return at(here, values).assign_attrs(words=words)
+    return words, at(here, values)
 
 
 def _draw_over_values(panel, here, looks, parameter):

@@ -105,12 +105,10 @@ def swept(group: Group, study: Study) -> Group:
 
 def fields_of(study: Study) -> Group:
     """Group of whole fields, which are stored for one value of each swept parameter: the group says which."""
-    place = "beam", "mesh_type", "material", "load"
-    swept = {
-        f"{SHOWN_PREFIX}{name}": (place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan)
-        for name in study.swept
-    }
-    return replace(FIELDS, variables=FIELDS.variables | swept)
+    place, variables = ("beam", "mesh_type", "material", "load"), {}
+    for name in study.swept:
+        variables[f"{SHOWN_PREFIX}{name}"] = place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan
+    return replace(FIELDS, variables=FIELDS.variables | variables)
 
 
 # -- rows --------------------------------------------------------------------------------------------------------------
@@ -200,7 +198,9 @@ def _beam_groups(study, folder):
         finite = found["/finite_strain"] = group.of_rows(axes | {"reference": study.further_references}, rows)
         _write_errors(finite.deformation_error, data.displacement, finite.reference_displacement)
     if pressed(study):
-        kinds, group = (_small_strain_name(study), *study.further_references), swept(BLOCK, study)
+        in_plane = {one["material_plane"] for one in planes}
+        small = f"small-strain-plane-{in_plane.pop()}" if len(in_plane) == 1 else "small-strain"
+        kinds, group = (small, *study.further_references), swept(BLOCK, study)
         rows = [*planes, *_face_reference_rows(study, folder, kinds), *faces]
         own = {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}
         block = found["/block"] = group.of_rows(axes | own, rows)
@@ -308,11 +308,6 @@ def _curve_rows(study, folder, answers):
                 "deformation_error": deformation_error(displacement, wanted),
                 "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
             }
-
-
-def _small_strain_name(study):
-    planes = {one.material.plane for one in study.references}
-    return "small-strain" if len(planes) > 1 else f"small-strain-plane-{planes.pop()}"
 
 
 def _finite_reference_rows(study, folder):
@@ -462,24 +457,19 @@ def _shape_scene_rows(study, folder, answers):
         keys = {one: bodies.shape_scene_task(study, one)["key"] for one in scenes}
         results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
         for one, key in keys.items():
-            reference = answers.get((one.shape, one.material, one.load))
-            yield from _rows_of_shape_scene(study.shapes, one, results[key], reference)
-
-
-def _rows_of_shape_scene(shapes, one, result, reference):
-    labels, case, whys = vars(one), shapes.shape[one.shape].loads[one.load], []
-    if reference:
-        whys = [f"no reference: {why}" for why in _reasons(shapes, one.shape, one.load, reference)]
-        whys.append(_shape_objection(reference, one.kinematics))
-    message = with_names(result.get("message", ""), shapes.shape[one.shape], case)
-    message = _with_objection(result, message, "; ".join(filter(None, whys)))
-    yield result | labels | {"solve_seconds": result["seconds"], "message": message}
-    known = (reference or {}).get("values", {})
-    for quantity in case.quantities:
-        key = quantity_key(quantity)
-        value = result.get("values", {}).get(key, np.nan)
-        errors = {"error": _error(value, known.get(key, np.nan)), "expected_error": _error(value, quantity.expected)}
-        yield labels | {"quantity": quantity.name, "value": value} | errors
+            result, labels, shape, whys = results[key], vars(one), study.shapes.shape[one.shape], []
+            case, reference = shape.loads[one.load], answers.get((one.shape, one.material, one.load), {})
+            if reference:
+                whys = [f"no reference: {why}" for why in _reasons(study.shapes, one.shape, one.load, reference)]
+                whys.append(_shape_objection(reference, one.kinematics))
+            message = with_names(result.get("message", ""), shape, case)
+            message = _with_objection(result, message, "; ".join(filter(None, whys)))
+            yield result | labels | {"solve_seconds": result["seconds"], "message": message}
+            for quantity in case.quantities:
+                key = quantity_key(quantity)
+                value, known = (values.get("values", {}).get(key, np.nan) for values in (result, reference))
+                errors = {"error": _error(value, known), "expected_error": _error(value, quantity.expected)}
+                yield labels | {"quantity": quantity.name, "value": value} | errors
 
 
 def _error(value, reference):

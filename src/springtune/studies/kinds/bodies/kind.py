@@ -452,9 +452,9 @@ def _reference_tasks(study):
 
 
 def _curve_tasks(study):
-    for mesh, curves in curves_by_mesh(study).items():
-        for task in (curve_task(study, one) for one in curves):
-            yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
+    for one in study.curves:
+        task, name = curve_task(study, one), stem(one.mesh)
+        yield Task(task, name=name, file=name, key=task["key"])
 
 
 def _solve_tasks(study):
@@ -478,16 +478,6 @@ STAGES = (
 
 
 # -- kind --------------------------------------------------------------------------------------------------------------
-
-
-def _check(config, problems):
-    if config.shapes or config.shape_grids:
-        of_shapes.check(config, problems)
-
-
-def _expand(config, declared):
-    # Not an empty part, which would say that the study has no bodies.
-    return {"shapes": of_shapes.expand(config, declared) if config.shape_grids else None}
 
 
 def _axes(found):
@@ -540,8 +530,9 @@ KIND = StudyKind(
     alone=("shape_grids",),
     reads=("grids",),
     files=_files,
-    check=_check,
-    expand=_expand,
+    check=of_shapes.check,
+    # Not an empty part, which would say that the study has no bodies.
+    expand=lambda config, declared: {"shapes": of_shapes.expand(config, declared) if config.shape_grids else None},
     axes=_axes,
     summary=_summary,
     stages=STAGES,
@@ -554,46 +545,31 @@ def summary(study: Study, further: list[list[object]]) -> str:
     """Summary of a study as text: numbers of scenes, meshes, references and curves."""
     title = f"{study.name}: {study.title}"
     if not study.scenes:
-        return "\n".join([title, "", aligned(further, left=0, right=(1,))])
+        return "\n\n".join([title, aligned(further, left=0, right=(1,))])
     # Sheets of several thicknesses share a mesh.
     meshes = len({(one.beam.length, one.beam.height, one.mesh_type, one.mesh_size, one.file) for one in study.meshes})
     each = (len(study.scenes) + len(study.curves)) / meshes
     requested = sum(len(grid.scenes) for grid in study.grids)
     repeated = requested - len(study.scenes)
-    again, scaled = (
-        f"{repeated} of {requested} are in more than one grid",
-        "small strain scales with force, E t and size",
-    )
+    bodies = dict.fromkeys((one.beam, one.material, one.load) for one in study.references)
+    solved = {unit_problem_of(*body) for body in bodies if "interpolant" not in reference_of(study, *body)}
+    counts = {"solution": len(solved), "interpolant": len(interpolants(study))}
+    parts = " and ".join(f"{n} {what}{'s' * (n != 1)}" for what, n in counts.items() if n) or "0 solutions"
     rows: list[list[object]] = [
-        ["scenes", len(study.scenes), again if repeated else ""],
+        ["scenes", len(study.scenes), f"{repeated} of {requested} are in more than one grid" if repeated else ""],
         ["meshes", meshes, f"each serves {each:.3g} scenes and curves on average"],
-        ["references", len(study.references), f"from {_count_solutions(study)}: {scaled}"],
+        ["references", len(study.references), f"from {parts}: small strain scales with force, E t and size"],
         ["curves", len(study.curves), f"{len(study.stiffness_ratios)} stiffnesses each, along one solution path"],
         *further,
         *([["printed", len(study.printed), "cells to compare with"]] if study.printed else []),
     ]
-    grids = aligned(_grid_rows(study), left=0, right=(1, 2, 3, 4, 5))
-    return "\n".join([title, "", aligned(rows, left=0, right=(1,)), "", grids])
-
-
-def _count_solutions(study: Study) -> str:
-    problems = {
-        unit_problem(one.beam, one.material, LOADS[one.load].kind)
-        for one in study.references
-        if "interpolant" not in reference_of(study, one.beam, one.material, one.load)
-    }
-    counts = {"solution": len(problems), "interpolant": len(interpolants(study))}
-    return " and ".join(f"{n} {what}{'s' * (n != 1)}" for what, n in counts.items() if n) or "0 solutions"
-
-
-def _grid_rows(study: Study) -> list[list[object]]:
-    """Rows of the table of grids; new scenes are in no grid above."""
-    rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
+    grids: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()
     for grid in study.grids:
         scenes = set(grid.scenes)
-        references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
-        meshes = {scene.mesh for scene in scenes}
-        rows.append([grid.name, len(scenes), len(scenes - seen), len(meshes), len(references), len(grid.curves)])
+        forces = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
+        sizes = len(scenes), len(scenes - seen), len({scene.mesh for scene in scenes}), len(forces), len(grid.curves)
+        grids.append([grid.name, *sizes])
         seen |= scenes
-    return rows
+    texts = aligned(rows, left=0, right=(1,)), aligned(grids, left=0, right=(1, 2, 3, 4, 5))
+    return "\n\n".join([title, *texts])

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from operator import itemgetter
 from typing import Any
 
@@ -106,6 +107,8 @@ def _of_scenes(name: str) -> Callable[[Study], dict[str, dict[str, str]]]:
     return lambda study: distinct(name, SCENE_LABELS, map(study.labels, study.scenes))
 
 
+SceneOutput = partial(Output, job="scenes", usual=True)
+
 OUTPUTS = (
     Output(
         "sensitivity",
@@ -115,22 +118,15 @@ OUTPUTS = (
         job="sensitivity",
         usual=True,
     ),
-    Output("size", "errors against mesh size", _of_scenes("size"), plot=f"{PLOTS}:size", job="scenes", usual=True),
-    Output(
-        "deformed",
-        "deformed networks, and the group `/fields`",
-        figures=_of_scenes("deformed"),
-        plot=f"{PLOTS}:deformed",
-        job="scenes",
-        usual=True,
+    SceneOutput("size", "errors against mesh size", _of_scenes("size"), plot=f"{PLOTS}:size"),
+    SceneOutput(
+        "deformed", "deformed networks, and the group `/fields`", _of_scenes("deformed"), plot=f"{PLOTS}:deformed"
     ),
-    Output(
+    SceneOutput(
         "sweep",
         "errors against a swept force, thickness, modulus, Poisson's ratio or stiffness",
-        figures=_sweeps,
+        _sweeps,
         plot=f"{PLOTS}:sweep",
-        job="scenes",
-        usual=True,
     ),
     Output(
         "paraview",
@@ -140,7 +136,7 @@ OUTPUTS = (
         into="paraview",
         job="scenes",
     ),
-    Output("tables", "the paper's tables, on one page", page=True, job="scenes", usual=True),
+    SceneOutput("tables", "the paper's tables, on one page", page=True),
     Output(
         "block",
         "a pressed face",

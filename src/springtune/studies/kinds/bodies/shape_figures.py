@@ -292,7 +292,9 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
     tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
     networks = case.reindex(definition=wanted)
-    scale, most = style.magnification(networks), _largest_force(networks)
+    scale, forces = style.magnification(networks), np.abs(networks.spring_force.values)
+    # Of 3 % of the springs the force is beyond the ends of the colour scale.
+    most = float(np.nanquantile(forces, 0.97)) if np.nanmax(forces, initial=0.0) > 0 else 1.0
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
@@ -319,12 +321,6 @@ def _choose_definitions(cut, asked):
     solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
     order = sorted(asked, key=lambda name: (not solved[name], name not in SHOWN_FIRST))
     return [name for name in asked if name in order[:MOST_NETWORKS]]
-
-
-def _largest_force(networks):
-    """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
-    forces = np.abs(networks.spring_force.values)
-    return float(np.nanquantile(forces, 0.97)) if np.nanmax(forces, initial=0.0) > 0 else 1.0
 
 
 def _draw_network(panel, one, state, scale, most):

@@ -514,8 +514,14 @@ LARGEST_FILE_CHECKED = 1_000_000
 
 def check(config, problems):
     """Add what is wrong, see `springtune.studies.config.model.StudyKind`."""
+    stems = {}
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
+        for load in shape.loads:
+            other = stems.setdefault(f"{name}_{load}".casefold(), (name, load))
+            if other != (name, load):
+                two = f"figures of shape '{name}' under '{load}' and of '{other[0]}' under '{other[1]}'"
+                problems.add((*path, "loads", load), f"{two} would have one name; rename a shape or a load")
         for part, material in shape.parts.items():
             if any(any(case.gravity) for case in shape.loads.values()):
                 check_density(config, material, (*path, "parts", part), problems)
@@ -528,7 +534,6 @@ def check(config, problems):
                 problems.add((*path, "file"), f"'{file}': {why}; {FROM_THE_STUDY}")
             elif problems.nothing:
                 _check_file(name, shape, Path(file), path, problems, extents)
-    _check_stems(config, problems)
     for name, grid in (config.shape_grids or {}).items() if problems.nothing else ():
         _check_grid(config, grid, ("shape_grids", name), problems)
 
@@ -635,17 +640,6 @@ def _check_file(name, shape, file, path, problems, extents):
             check_case(grouped, case)
         except ValueError as error:
             _add_fault(problems, path, str(error))
-
-
-def _check_stems(config, problems):
-    stems = {}
-    for name, shape in config.shapes.items():
-        for load in shape.loads:
-            other = stems.setdefault(f"{name}_{load}".casefold(), (name, load))
-            if other != (name, load):
-                two = f"figures of shape '{name}' under '{load}' and of '{other[0]}' under '{other[1]}'"
-                remedy = "rename a shape or a load"
-                problems.add(("shapes", name, "loads", load), f"{two} would have one name; {remedy}")
 
 
 def _check_grid(config, grid, path, problems):

@@ -50,21 +50,14 @@ def write(folder: str | Path, name: str, key: str, made: GroupedMesh | None, kno
         path.unlink(missing_ok=True)
     else:
         write_mesh(path, made.mesh)
-        known |= {"checksum": checksum(path), "groups": _groups_as_lists(made)}
-    store.add(notes, {NOTES_KEY: {"key": key, **known}})
-
-
-def _groups_as_lists(grouped: GroupedMesh) -> dict[str, Any]:
-    """Groups of a mesh: edges of sides, coordinates of points, and numbers of the cells of parts."""
-    return {
-        "sides": {name: edges.tolist() for name, edges in grouped.sides.items()},
-        "points": {name: [float(x) for x in point] for name, point in grouped.points.items()},
-        "parts": {
+        known |= {"checksum": checksum(path), "unusable": dict(made.unusable)}
+        known["sides"] = {name: edges.tolist() for name, edges in made.sides.items()}
+        known["points"] = {name: [float(x) for x in point] for name, point in made.points.items()}
+        known["parts"] = {
             name: {str(corners): np.flatnonzero(inside).tolist() for corners, inside in cells.items()}
-            for name, cells in grouped.parts.items()
-        },
-        "unusable": dict(grouped.unusable),
-    }
+            for name, cells in made.parts.items()
+        }
+    store.add(notes, {NOTES_KEY: {"key": key, **known}})
 
 
 def is_stored(folder: str | Path, name: str, key: str) -> bool:
@@ -99,16 +92,16 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
     if checksum(path) != notes["checksum"]:
         raise DamagedError(path, "it is damaged (its checksum is another one)")
     mesh = read_stored(path)
-    groups, count = notes["groups"], {corners: len(cells) for corners, cells in mesh.cells.items()}
+    count = {str(corners): len(cells) for corners, cells in mesh.cells.items()}
     return GroupedMesh(
         mesh,
-        {side: np.array(edges, dtype=np.int64).reshape(-1, 2) for side, edges in groups["sides"].items()},
-        {point: np.array(place) for point, place in groups["points"].items()},
+        {side: np.array(edges, dtype=np.int64).reshape(-1, 2) for side, edges in notes["sides"].items()},
+        {point: np.array(place) for point, place in notes["points"].items()},
         {
-            part: {int(corners): np.isin(np.arange(count[int(corners)]), inside) for corners, inside in cells.items()}
-            for part, cells in groups["parts"].items()
+            part: {int(corners): np.isin(np.arange(count[corners]), inside) for corners, inside in cells.items()}
+            for part, cells in notes["parts"].items()
         },
-        groups["unusable"],
+        notes["unusable"],
     )
 
 

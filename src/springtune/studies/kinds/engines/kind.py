@@ -171,19 +171,14 @@ def _summary(runs):
     return [["engines", len(runs), f"runs in {', '.join(engines)}{missing}"]]
 
 
-def _version(engine):
-    """Versions of the packages that an engine needs, or "none"; a new version runs the engine again."""
-    names = (distribution(need.partition(">=")[0]) for need in engine.needs)
-    return ", ".join(f"{name} {version_of(name)}" for name in names)
-
-
 def _tasks(study):
     """Tasks of all runs; those of one engine share a job, because their seconds are measured."""
     for run in study.parts["engines"]:
         engine = _engines()[run.labels["engine"]]
         values = {name: value for name, value in run.values.items() if name != "scene"}
         also = mesh_type_key(values["mesh_type"]), definition_key(values["definition"]), declared_key(engine)
-        values["engine_version"] = _version(engine)
+        needs = (distribution(need.partition(">=")[0]) for need in engine.needs)
+        values["engine_version"] = ", ".join(f"{name} {version_of(name)}" for name in needs)  # a new one runs again
         yield Task(values, also, run.labels, name=engine.name)
 
 
@@ -194,8 +189,6 @@ def _figures(study):
     shown = [("curves" if run.of_curve else "errors", run.labels["scene"]) for run in study.parts["engines"]]
     return {f"engines_{name}_{scene}": {"scene": scene} for name, scene in shown}
 
-
-FIGURES = "studies.kinds.engines.figures"
 
 KIND = StudyKind(
     "engines",
@@ -210,7 +203,7 @@ KIND = StudyKind(
             "engines",
             "errors over frame time and sensitivity curves in engines",
             _figures,
-            plot=f"{FIGURES}:engines",
+            plot="studies.kinds.engines.figures:engines",
             shows="scenes in engines",
         ),
     ),

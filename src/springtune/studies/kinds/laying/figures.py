@@ -54,13 +54,12 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
     names = labels_of(laid.status != 0, "definition")
     size = (style.PAGE_WIDTH, (1.05 + 0.16 * max(len(names), 4)) * len(shown))
     _, axes = style.panels(ax, len(shown), 3, figsize=size, width_ratios=[1.9, 1.0, 1.0])
-    for row, cell in zip(axes, shown):
-        _draw_row(row, laid.sel(cell), cell, names)
+    for panels, cell in zip(axes, shown):
+        _draw_row(*panels, laid.sel(cell), cell, names)
     return axes
 
 
-def _draw_row(row, laid, cell, names):
-    shape, area, elongation = row
+def _draw_row(shape, area, elongation, laid, cell, names):
     friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
     style.add_note(shape, [_draw_shape(shape, laid, names)])
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")

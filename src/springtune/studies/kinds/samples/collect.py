@@ -133,24 +133,18 @@ def _coordinates(sample, drawn, dimensions):
     return replace(SAMPLES, variables=SAMPLES.variables | variables, flags={"role": tuple(parts)}), places
 
 
-def _quantities(sample, data):
-    """Yield the labels of each quantity, load and definition, and values by row, NaN if not solved."""
-    for quantity, load, name in product(QUANTITIES, sample.load, sample.definition):
-        one = data[[quantity, "status"]].sel(load=load, definition=name)
-        values = one[quantity].values
-        if quantity != "best_stiffness":
-            values = np.where(one.status.values == Status.SOLVED, values, np.nan)
-        yield {"quantity": quantity, "load": load, "definition": name}, values
-
-
 def _indices(sample, data):
-    for labels, values in _quantities(sample, data):
-        rows = values.reshape(sample.size, -1).T
+    for quantity, load, name in product(QUANTITIES, sample.load, sample.definition):
+        labels = {"quantity": quantity, "load": load, "definition": name}
+        one = data[[quantity, "status"]].sel(load=load, definition=name)
+        if quantity != "best_stiffness":
+            one = one.where(one.status == Status.SOLVED)
+        rows = one[quantity].values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)
         kept = rows[:, there]
         # A variation below the reference's own error is no variation of the networks' errors.
-        known = data.reference_error_estimate.sel(load=labels["load"]).values
-        least = float(np.nanmax(known, initial=0.0)) if labels["quantity"] == "deformation_error" else 0.0
+        known = data.reference_error_estimate.sel(load=load).values
+        least = float(np.nanmax(known, initial=0.0)) if quantity == "deformation_error" else 0.0
         yield pd.DataFrame([labels | {"base_samples": there.sum(), "base_samples_without": (~there).sum()}])
         yield pd.DataFrame(labels | {"parameter": sample.varied} | sobol_indices(kept[0], kept[1], kept[2:], least))
 

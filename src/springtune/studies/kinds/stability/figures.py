@@ -6,7 +6,7 @@ from matplotlib.colors import ListedColormap
 from springtune.safe_io import no_mathematics
 
 from ...output import style
-from ...output.dataset import STATUS, group, labels_of, table_rows
+from ...output.dataset import STATUS, choose, group, labels_of, table_rows
 
 BEHAVIOUR_COLOURS = {"stable": "#f4f4f4", "decaying": "#b5cfe3", "growing": "#d07a1f", "NaN": "#4a0d1a"}
 """Colours of the flags, from light to dark."""
@@ -30,9 +30,7 @@ def stability(tree):
 def _experiment(data, name):
     """Return the group ``/stability``, or raise if it lacks an experiment."""
     data = group(data, "stability")
-    done = data.experiment.values.tolist()
-    if name not in done:
-        raise ValueError(f"the dataset has no experiment {name!r}; it has {', '.join(map(repr, done))}")
+    choose(data.experiment != "", experiment=name)
     return data
 
 
