@@ -412,16 +412,10 @@ def _shape_objection(result, kinematics):
 def _shape_reference_rows(study, answers):
     for (shape, material, load), result in answers.items():
         labels = {"shape": shape, "material": material, "load": load}
-        whys = [*_reasons(study.shapes, shape, load, result), _shape_objection(result, "nonlinear")]
-        row = {f"reference_{name}": result.get(name) for name in ("seconds", "unknowns", "rotation", "strain")}
-        yield labels | row | {"reference_message": "; ".join(filter(None, whys))}
-        if result["message"]:
-            continue
-        for kinematics in study.axes["kinematics"]:
+        yield labels | {f"reference_{name}": result.get(name) for name in ("seconds", "unknowns", "rotation", "strain")}
+        yield from _rows_of_reference(study.shapes, labels, result, _shape_objection(result, "nonlinear"))
+        for kinematics in study.axes["kinematics"] if not result["message"] else ():
             yield labels | {"kinematics": kinematics, "reference_applies": not _shape_objection(result, kinematics)}
-        for one in study.shapes.shape[shape].loads[load].quantities:
-            row = labels | {"quantity": one.name} | _reference_values(result, one)
-            yield row | {"reference_expected_error": _error(row["reference_value"], one.expected)}
 
 
 def _shapes_at_finite_strain(study, folder, values):
@@ -429,11 +423,8 @@ def _shapes_at_finite_strain(study, folder, values):
     shapes, rows, references = study.shapes, [], {}
     for shape, material, load, law in shapes.finite:
         result = _shape_reference(study, folder, shape, material, load, law)
-        labels = {"shape": shape, "material": material, "load": load, "law": law}
         references[shape, material, load, law] = result.get("values", {})
-        rows.append(labels | {"reference_message": "; ".join(_reasons(shapes, shape, load, result))})
-        for one in shapes.shape[shape].loads[load].quantities if not result["message"] else ():
-            rows.append(labels | {"quantity": one.name} | _reference_values(result, one))
+        rows += _rows_of_reference(shapes, {"shape": shape, "material": material, "load": load, "law": law}, result)
     for one in shapes.scenes:
         reference = references.get((one.shape, one.material, one.load, one.law), {})
         for quantity in shapes.shape[one.shape].loads[one.load].quantities if reference else ():
@@ -444,11 +435,15 @@ def _shapes_at_finite_strain(study, folder, values):
     return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
-def _reference_values(result, quantity):
-    """Reference value of a quantity and its error estimate."""
-    key = quantity_key(quantity)
-    names = {"reference_value": "values", "reference_error_estimate": "error_estimates"}
-    return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
+def _rows_of_reference(shapes, labels, result, objection=""):
+    """Rows of a reference: its message, and value, error estimate and expected error of each quantity."""
+    shape, load = labels["shape"], labels["load"]
+    whys = [*_reasons(shapes, shape, load, result), objection]
+    yield labels | {"reference_message": "; ".join(filter(None, whys))}
+    for one in shapes.shape[shape].loads[load].quantities if not result["message"] else ():
+        value, estimate = (result[name].get(quantity_key(one), np.nan) for name in ("values", "error_estimates"))
+        row = {"quantity": one.name, "reference_value": value, "reference_error_estimate": estimate}
+        yield labels | row | {"reference_expected_error": _error(value, one.expected)}
 
 
 def _shape_scene_rows(study, folder, answers):

@@ -468,11 +468,10 @@ def expand(config, declared):
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
-            meshes = [(MESH_OF_FILE, one.mesh_size) for one in shape.file or ()] or [
-                (GENERATED_MESH, size) for size in grid.mesh_size
-            ]
-            axes = meshes, grid.material, grid.load or shape.loads, grid.definition, grid.kinematics
-            own = [ShapeScene(name, *mesh, *labels) for mesh, *labels in product(*axes)]
+            sizes = [one.mesh_size for one in shape.file or ()] or grid.mesh_size
+            mesh = [name], [MESH_OF_FILE if shape.file else GENERATED_MESH], sizes
+            axes = *mesh, grid.material, grid.load or shape.loads, grid.definition, grid.kinematics
+            own = [ShapeScene(*labels) for labels in product(*axes)]
             found.update(own)
             referred.update(_case(one) for one in own if grid.reference)
             finite.update((*_case(one), one.law) for one in own if grid.finite_strain and one.law)

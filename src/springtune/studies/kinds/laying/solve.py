@@ -54,7 +54,8 @@ class Trapezoid:
 
 def solve(task):
     """Rows of a strip; a reference has several meshes and an error band."""
-    trapezoid, found = Trapezoid(**task["trapezoid"]), [_strip_result(task, size) for size in task["mesh_sizes"]]
+    trapezoid = Trapezoid(**task["trapezoid"])
+    found = [_strip_result(task, trapezoid, size) for size in task["mesh_sizes"]]
     first, is_reference = found[0], len(found) > 1
     points, name = first.pop("outline", np.empty((0, 2))).tolist(), "reference" if is_reference else "strip"
     rows = [{"outline_point": place, f"{name}_x": x, f"{name}_y": y} for place, (x, y) in enumerate(points)]
@@ -69,22 +70,17 @@ def solve(task):
     return {"rows": [first, *rows]}
 
 
-def _strip_result(task, size):
-    made = {
-        "strip": Beam(**task["strip"]),
-        "trapezoid": Trapezoid(**task["trapezoid"]),
-        "material": material_of(task["material"]).in_plane,
-        "support": material_of(task["support"]).in_plane,
-    }
-    made |= {name: task[name] for name in ("definition", "loading", "pressure", "friction")}
+def _strip_result(task, trapezoid, size):
+    material, support = (material_of(task[name]).in_plane for name in ("material", "support"))
+    options = {name: task[name] for name in ("definition", "loading", "pressure", "friction")}
     try:
-        found = lay(**made, size=size)
+        found = lay(Beam(**task["strip"]), trapezoid, material, support, size=size, **options)
     except DefinitionError as error:
         return {"status": int(Status.FAILED), "message": f"{task['definition']}: {error}"}
     if found.message:
         del found.area_under_strip, found.elongation, found.contact_force_error
         return vars(found) | {"status": int(Status.NOT_CONVERGED)}
-    area_error = found.area_under_strip / made["trapezoid"].area - 1
+    area_error = found.area_under_strip / trapezoid.area - 1
     return vars(found) | {"status": int(Status.SOLVED), "area_error": area_error}
 
 

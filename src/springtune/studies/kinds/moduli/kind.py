@@ -52,10 +52,6 @@ def _expand(config, declared):
     return (Beam(*sides, min(sides), "patch"), [dict(zip(PATCH, one)) for one in sorted(found)]) if found else None
 
 
-def _axes(moduli):
-    return {"poisson_ratio": tuple(sorted({labels["poisson_ratio"] for labels in moduli[1]}))}
-
-
 def _summary(moduli):
     patches = len({(labels["mesh_type"], labels["mesh_size"]) for labels in moduli[1]})
     return [["moduli", len(moduli[1]), f"measured on {patches} patch{'es' * (patches != 1)}"]]
@@ -102,7 +98,7 @@ KIND = StudyKind(
     grid_fields={"moduli": (Flag, default("false", description="Measure effective moduli on the box under `patch`."))},
     check=_check,
     expand=_expand,
-    axes=_axes,
+    axes=lambda moduli: {"poisson_ratio": sorted({labels["poisson_ratio"] for labels in moduli[1]})},
     summary=_summary,
     variables=declared_variables(__file__),
     dimensions=declared_dimensions(__file__),

@@ -13,10 +13,6 @@ INDEX_LIMITS = -0.3, 1.5
 """Ends of the axis of Sobol indices at most, whose bands may go farther."""
 
 
-def _parameter_name(name):
-    return PARAMETER_WORDS.get(name, name.replace("_", " "))
-
-
 @style.styled
 def plot_sobol(data, ax=None, *, load=None):
     """Sobol indices of a sample, one panel per quantity and definition.
@@ -69,7 +65,7 @@ def plot_sobol(data, ax=None, *, load=None):
             panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
             panel.hlines(places + shift, *ends, color="k", linewidth=0.8)
         panel.set(xlim=(low - 0.02, high + 0.02), ylim=(len(names) - 0.45, -0.55), xlabel="share of the variance")
-        panel.set_yticks(range(len(names)), [_parameter_name(name) for name in names])
+        panel.set_yticks(range(len(names)), [PARAMETER_WORDS.get(name, name.replace("_", " ")) for name in names])
         panel.tick_params(axis="y", length=0)
         panel.grid(False, axis="y")
         if not np.isfinite(indices.first_order.values).any():

@@ -246,13 +246,9 @@ def _expand(config, declared):
 
 
 def _summary(sample):
-    counts = {
-        "base sample": sample.size,
-        "row": sample.each,
-        "load": len(sample.load),
-        "definition": len(sample.definition),
-    }
-    of = " x ".join(f"{count} {what}s" for what, count in counts.items() if count > 1)
+    counts = sample.size, sample.each, len(sample.load), len(sample.definition)
+    named = zip(counts, ("base samples", "rows", "loads", "definitions"))
+    of = " x ".join(f"{count} {what}" for count, what in named if count > 1)
     return [["samples", sample.scenes, f"scenes, {of}, design '{sample.design}': {', '.join(sample.varied)}"]]
 
 

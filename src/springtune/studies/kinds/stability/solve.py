@@ -253,8 +253,8 @@ def _judged_row(name, **labels):
 
     def note(status, message, pivots=np.nan):
         """Write status, message and negative pivots into the row."""
-        values = {"status": int(status), "message": message, "negative_pivots": pivots}
-        labels.update({f"{name}_{key}": value for key, value in values.items()})
+        labels[f"{name}_status"], labels[f"{name}_message"] = int(status), message
+        labels[f"{name}_negative_pivots"] = pivots
 
     def judge(problem, s, solution):
         """Judge a solution, and return whether it is an equilibrium."""
