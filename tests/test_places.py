@@ -36,7 +36,7 @@ from springtune.springs import DEFINITIONS
 import springtune as st
 found = {
     "place": st.__file__,
-    "DEFINITIONS": {name: keys.definition_closure(name).digest for name in DEFINITIONS},
+    "DEFINITIONS": {name: keys.declared_closure(one).digest for name, one in DEFINITIONS.items()},
     "MESH_TYPES": {name: keys.mesh_type_closure(name).digest for name in MESH_TYPES},
     "light": not {"scipy", "h5py", "meshio", "netgen", "xarray", "pydantic"} & set(sys.modules),
 }

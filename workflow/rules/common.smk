@@ -19,7 +19,6 @@ from springtune.problem.shapes import AssumptionWarning
 from springtune.safe_io import remove_unfinished, reset_future_times, rst
 from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import FORMATS
-from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import locks, plan
 from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder

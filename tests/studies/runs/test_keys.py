@@ -132,7 +132,7 @@ def own(tmp_path, monkeypatch):
         (tmp_path / f"{name}.py").write_text(text)
         importlib.import_module(name)
         keys.file_digest.cache_clear()
-        found = keys.definition_closure("own")
+        found = keys.declared_closure(st.DEFINITIONS["own"])
         st.DEFINITIONS.discard("own")
         sys.modules.pop(name)
         return found
@@ -191,6 +191,6 @@ def test_a_definition_that_was_typed_is_refused_with_the_remedy():
     st.definition("own")(space["springs"])
     try:
         with pytest.raises(ValueError, match="'own' was typed, and jobs of a study do not find it; put it into a"):
-            keys.definition_closure("own")
+            keys.declared_closure(st.DEFINITIONS["own"])
     finally:
         st.DEFINITIONS.discard("own")

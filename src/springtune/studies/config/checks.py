@@ -4,6 +4,7 @@ import math
 import os
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from springtune.mesh.cells import MESH_TYPES, too_many
@@ -144,10 +145,11 @@ def check_scenes(config: StudyConfig, problems: Problems) -> None:
         problems.stop_at((), str(error))
     labels: dict[str, set[Any]] = defaultdict(set)
     for name, grid in config.grids.items():
-        parts = {" and ".join(group): rows for group, rows in factors(grid)}
-        left -= check_count(problems, ("grids", name), parts, left, what, f"{FEWER}, {MORE_SCENES}")
+        parts = factors(grid)
+        lists = {" and ".join(group): rows for group, rows in parts}
+        left -= check_count(problems, ("grids", name), lists, left, what, f"{FEWER}, {MORE_SCENES}")
         what = "scenes beside those of the grids above"
-        for group, rows in factors(grid):
+        for group, rows in parts:
             for label, values in zip(group, zip(*rows)):
                 labels[label] |= set(values)
     problems.stop()
@@ -166,8 +168,7 @@ def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool
         path = ("sensitivity", "points")
         check_count(problems, path, of_curves, MOST_CURVE_POINTS, "points of curves", remedy)
     for name, values in lists.items():
-        numbers = sorted(value for value in values if isinstance(value, float))
-        for one, other in zip(numbers, numbers[1:]):
+        for one, other in pairwise(sorted(value for value in values if isinstance(value, float))):
             if other - one <= SAME_VALUE * other:
                 problems.add(("grids",), f"{name} has {one!r} and {other!r}, which are one label; write them alike")
 

@@ -58,7 +58,6 @@ def load(path: str | Path, kinds: tuple[StudyKind, ...]) -> Study:
     mesh_files = files_of_meshes(config, bodies.beams, problems)
     grids = expand(config, bodies, mesh_files, problems)
     checks.check_meshes(config, grids, problems)
-    problems.stop()
     checks.check_definitions(config, grids, problems)
     problems.stop()
     printed_path = path.parent / config.printed if config.printed else None
@@ -152,11 +151,6 @@ def _body_makers(
     return beam, material, mesh
 
 
-def _force(pressure: float, beam: Beam) -> float:
-    """Force of a pressure on the upper side [N], rounded so that equal forces share a label."""
-    return float(f"{pressure * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
-
-
 def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Expand grids into scenes and curves."""
     make_beam, make_material, make_mesh = _body_makers(bodies, mesh_files)
@@ -169,13 +163,14 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
         for one in combinations(grid):
             beam, load = make_beam(one["beam"], one.get("thickness")), one["load"]
             material = make_material(one["material"], one.get("young_modulus"), one.get("poisson_ratio"))
-            magnitude = _force(one["pressure"], beam) if "pressure" in one else one["force"]
+            if "pressure" in one:  # a force on the upper side, rounded so that equal forces share a label
+                one["force"] = float(f"{one['pressure'] * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
             mesh = make_mesh(beam, one["mesh_type"], one["mesh_size"])
             if mesh is None:
                 absent.add((one["mesh_type"], beam.name, f"{1e3 * one['mesh_size']:g} mm"))
                 continue
             sign, follows = signs[load]
-            common = (mesh, material, load, sign * magnitude)
+            common = (mesh, material, load, sign * one["force"])
             scenes.append(SceneSpec(*common, one["definition"], one["kinematics"], one.get("stiffness_scale", 1.0)))
             if grid.sensitivity and not follows:  # k enters as F/k only where forces stay
                 curves[CurveSpec(*common, one["kinematics"])] = None

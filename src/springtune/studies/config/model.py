@@ -400,11 +400,8 @@ def outputs(*names: str) -> dict[str, Output]:
     for kind in KINDS:
         if names and found.keys() >= {*names}:
             break
-        module = f"studies.kinds.{kind}.outputs"
-        own = (
-            import_name(f"{module}:OUTPUTS")
-            if module in apart
-            else import_name(f"studies.kinds.{kind}.kind:KIND").outputs
-        )
+        package = f"studies.kinds.{kind}"
+        is_apart = f"{package}.outputs" in apart
+        own = import_name(f"{package}.outputs:OUTPUTS") if is_apart else import_name(f"{package}.kind:KIND").outputs
         found |= {output.name: output for output in own}
     return found

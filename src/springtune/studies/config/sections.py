@@ -62,9 +62,6 @@ MATERIAL_FORMS = (
 """Keys of the four forms of a material; a material has the keys of one form."""
 
 
-OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
-
-
 def _one_form(schema: dict[str, Any]) -> None:
     schema["oneOf"] = [{"required": list(form)} for form in MATERIAL_FORMS]
 
@@ -136,7 +133,7 @@ class MaterialConfig(Section):
             raise refuse("turns the axes of an orthotropic material, and this is none; remove it", "angle")
         if self.plane is not None and form is not MATERIAL_FORMS[0]:
             raise refuse("is for isotropic materials; remove it, and give a 'stiffness' in plane strain", "plane")
-        for key in OF_A_TEST:
+        for key in ("terms", "equibiaxial_test", "pure_shear_test"):
             if getattr(self, key) is not None and form is not MATERIAL_FORMS[3]:
                 raise refuse("goes with a 'uniaxial_test', and this material has none; remove it", key)
         if self.plane == "strain" and self.poisson_ratio == 0.5:
@@ -313,15 +310,14 @@ class GridConfig(Section):
 
     @model_validator(mode="after")
     def _check_force(self) -> Self:
-        if (self.force is None) == (self.pressure is None):
-            both = "both 'force' and 'pressure'; remove one"
-            pressed = all(LOADS[load].kind.pressed for load in self.load)
-            remedy = "one for each beam, material or load" + (", or 'pressure'" if pressed else "")
-            missing = f"'force' is missing; give a force such as '400 kN', or {remedy}"
-            raise refuse(missing if self.force is None else both, *(() if self.force is None else ("pressure",)))
-        for load in self.load if self.pressure is not None else ():
-            if not LOADS[load].kind.pressed:
-                raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
+        free = next((load for load in self.load if not LOADS[load].kind.pressed), "")
+        if self.force is None and self.pressure is None:
+            remedy = "one for each beam, material or load" + ("" if free else ", or 'pressure'")
+            raise refuse(f"'force' is missing; give a force such as '400 kN', or {remedy}")
+        if self.force is not None and self.pressure is not None:
+            raise refuse("both 'force' and 'pressure'; remove one", "pressure")
+        if self.pressure is not None and free:
+            raise refuse(f"load '{free}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 
     definition: OneOrMore[fields.DefinitionName]
@@ -345,8 +341,6 @@ GRID_PARAMETERS = tuple(name for name in GridConfig.model_fields if name not in 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
 """Names of zipped parameters, and one tuple of values for each combination."""
 
-Combination = dict[str, Any]
-
 SAME_VALUE = 1e-9
 """Relative difference below which two numbers are the same value."""
 
@@ -367,7 +361,7 @@ def factors(grid: GridConfig) -> list[Factor]:
     return found
 
 
-def combinations(grid: GridConfig) -> Iterator[Combination]:
+def combinations(grid: GridConfig) -> Iterator[dict[str, Any]]:
     """Yield the combinations of a grid."""
     parts = factors(grid)
     names = [*chain.from_iterable(group for group, _ in parts)]

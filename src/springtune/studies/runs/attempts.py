@@ -42,11 +42,6 @@ TRACEBACKS = 3
 
 LONGEST_KEY = 4096
 
-Values = Mapping[str, Any]
-"""Values of a task and its key."""
-
-Result = dict[str, Any]
-
 
 class RefusedError(Exception):
     """Tasks cannot be prepared, mostly because their mesh failed."""
@@ -140,8 +135,8 @@ def solve_files(module: ModuleType, content: dict[str, Any], attempts: Attempts)
 
 def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any], attempts: Attempts) -> None:
     path = Path(content["folder"]) / f"{file['name']}.h5"
-    failed: Callable[[Values, str], Result] = getattr(module, "failed", _failed)
-    parts: Callable[[Values, Result], dict[str, Result]] = getattr(module, "parts", _one_part)
+    failed = getattr(module, "failed", lambda task, why: {"status": Status.FAILED, "message": why})
+    parts = getattr(module, "parts", lambda task, result: {task["key"]: result})
     present = store.stored_keys(path)
     tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
     missing = [task for task in tasks if not parts(task, {}).keys() <= present]
@@ -165,11 +160,3 @@ def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any
             for key, part in parts(task, result).items():
                 if key != task["key"] or key not in present:  # stored numbers stay unchanged
                     keeper[key] = part
-
-
-def _failed(task: Values, why: str) -> Result:
-    return {"status": Status.FAILED, "message": why}
-
-
-def _one_part(task: Values, result: Result) -> dict[str, Result]:
-    return {task["key"]: result}

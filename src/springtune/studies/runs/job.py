@@ -19,7 +19,12 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
     warnings.simplefilter("ignore", AssumptionWarning)  # reading the study has warned
     note = _note(tasks, digest)
     if not note:
-        _plan(study, Path(tasks).parents[1])
+        from ..config.expand import load
+        from ..config.model import kinds  # here: a run has written the notes of all jobs
+        from .plan import stage_jobs
+
+        for job in stage_jobs(load(study, kinds()), Path(tasks).parents[1]).values():
+            job.write()
         note = _note(tasks, digest)
     if not note:
         raise SystemExit(f"{study} was changed while it ran; call the same command again")
@@ -37,16 +42,6 @@ def _note(tasks: str, digest: str) -> dict[str, Any]:
     """Note of a job, empty if it is of another one."""
     note = read_note(Path(tasks))
     return note if hash_of(note.get("module"), note.get("content")) == digest else {}
-
-
-def _plan(study: str, folder: Path) -> None:
-    """Write the notes of all jobs of a study."""
-    from ..config.expand import load
-    from ..config.model import kinds  # here: a run has written them
-    from .plan import stage_jobs
-
-    for job in stage_jobs(load(study, kinds()), folder).values():
-        job.write()
 
 
 def forget_job_of(product: Path, folder: Path) -> None:

@@ -132,11 +132,6 @@ def _files(name: str) -> Iterator[Path]:
     yield from (path.parent / "templates").glob(f"{path.name}.*.jinja")
 
 
-def definition_closure(name: str) -> Closure:
-    """Closure of a definition, which may be outside this package."""
-    return declared_closure(DEFINITIONS[name])
-
-
 def mesh_type_closure(name: str) -> Closure:
     """Closure of a mesh type; mesh files have the closure of their reader, with meshio."""
     if name in MESH_TYPES:
@@ -255,7 +250,7 @@ def stage_key(*modules: str, without: tuple[str, ...] = ()) -> str:
 
 def definition_key(name: str) -> str:
     """Key of a definition's code."""
-    return code_key(definition_closure(name))
+    return declared_key(DEFINITIONS[name])
 
 
 def declared_key(one: Declaration) -> str:

@@ -2,7 +2,6 @@
 
 import fcntl
 import filecmp
-import json
 import os
 import platform
 import shlex
@@ -14,7 +13,7 @@ from typing import TextIO
 
 from springtune.safe_io import write_json
 
-from .source import TASKS
+from .source import TASKS, read_note
 
 STUDY_FILE, RUN_FILE = f"{TASKS}/study.json", f"{TASKS}/run.json"
 """Files in a study's folder: the path of the config that was run last, and the process that runs it."""
@@ -36,10 +35,7 @@ def claim(folder: Path, config: Path) -> None:
 
 def claimed_study(folder: Path) -> Path | None:
     """File of the study that a folder belongs to, or None."""
-    try:
-        path = folder.parent.parent / json.loads((folder / STUDY_FILE).read_bytes())["config"]
-    except (OSError, ValueError, LookupError, TypeError):
-        return None
+    path = folder.parent.parent / str(read_note(folder / STUDY_FILE).get("config", ""))
     return path if path.is_file() else None
 
 
@@ -58,11 +54,12 @@ def lock(folders: Iterable[Path]) -> None:
     said = f"process {os.getpid()} on {platform.node()} computes it since {since} ({command})"
     for folder in folders:
         (folder / RUN_FILE).parent.mkdir(parents=True, exist_ok=True)
-        LOCKED_NOTES.append((folder / RUN_FILE).open("a+", encoding="utf-8"))
-        _lock(LOCKED_NOTES[-1], folder)
-        LOCKED_NOTES[-1].truncate(0)
-        LOCKED_NOTES[-1].write(f"{said}; wait for its end, or stop it: kill {os.getpid()}")
-        LOCKED_NOTES[-1].flush()
+        file = (folder / RUN_FILE).open("a+", encoding="utf-8")
+        _lock(file, folder)
+        LOCKED_NOTES.append(file)
+        file.truncate(0)
+        file.write(f"{said}; wait for its end, or stop it: kill {os.getpid()}")
+        file.flush()
 
 
 def unlock() -> None:

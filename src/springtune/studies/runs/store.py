@@ -69,10 +69,8 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
 
 def stored_keys(path: str | Path) -> set[str]:
     """Keys of stored results; of another layout none, so that it is written anew."""
-    if not Path(path).exists():
-        return set()
     with suppress(OtherLayoutError):
-        return set(read_all(path))
+        return set(read_all(path)) if Path(path).exists() else set()
     return set()
 
 
@@ -80,16 +78,15 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
     """Read results."""
     names = list(names)
     with _opened(path) as (file, scalars, places):
-        lacking = sum(name not in scalars for name in names)
-        results = {name: dict(scalars[name]) for name in names if name in scalars}
+        if lacking := sum(name not in scalars for name in names):
+            raise DamagedError(path, f"it lacks {lacking} of {len(names)} results")
+        results = {name: dict(scalars[name]) for name in names}
         dataset, labels = cache(file.__getitem__), set(fields)
         for name, result in results.items() if labels else ():
             for label in places[name].keys() & labels:
                 stack, row = places[name][label]
                 result[label] = dataset(stack)[row]
-    if lacking:
-        raise DamagedError(path, f"it lacks {lacking} of {len(names)} results")
-    return results
+        return results
 
 
 def read_all(path: str | Path) -> dict[str, dict[str, Any]]:
