@@ -70,8 +70,7 @@ class Display:
     def stop(self) -> None:
         """Stop, and remove the moving line."""
         self.over.set()
-        if self.moves:
-            self._write(LINE.format(""))
+        self.write_above(self.stream.flush)
 
     def line(self) -> str:
         """Numbers of jobs, elapsed and remaining time, and the rules of running jobs."""

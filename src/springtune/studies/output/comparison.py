@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
@@ -151,8 +151,9 @@ def compare(
     chosen = [[path for path in side if path in wanted] for side in nodes]
     both = {path: [side[path] for side in nodes] for path in chosen[0] if path in chosen[1]}
     found = [_compare_group(one, pair, roots, left_out, tolerance or Tolerance(), most) for one, pair in both.items()]
-    facts = [_noted_attributes(tree.attrs) for tree in (before, after)]
-    noted = {name: (facts[0].get(name, ""), facts[1].get(name, "")) for name in facts[0] | facts[1]}
+    facts = [tree.attrs | from_json(tree.attrs.get("software")) for tree in (before, after)]
+    names = [str(name) for name in facts[0] | facts[1] if name not in HIDDEN_ATTRIBUTES]
+    noted = {name: (str(facts[0].get(name, "")), str(facts[1].get(name, ""))) for name in names}
     inputs = [from_json(tree.attrs.get("inputs")) for tree in (before, after)]
     noted |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
     return Comparison(found, _names_of_one(chosen), {name: pair for name, pair in noted.items() if pair[0] != pair[1]})
@@ -172,12 +173,6 @@ def _names_of_one(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
     """Names that only one side has, for each side."""
     one, other = sides
     return [name for name in one if name not in other], [name for name in other if name not in one]
-
-
-def _noted_attributes(attributes: Mapping[Hashable, object]) -> dict[str, str]:
-    """Attributes that a comparison notes, and versions of packages."""
-    found = {str(name): value for name, value in attributes.items()} | from_json(attributes.get("software"))
-    return {name: str(value) for name, value in found.items() if name not in HIDDEN_ATTRIBUTES}
 
 
 def _compare_group(

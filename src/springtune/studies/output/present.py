@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,9 +16,6 @@ from ..config.model import Output, modules, outputs
 from . import reading
 from .dataset import sign_of_errors
 from .text import decimals, number
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
@@ -45,23 +42,13 @@ def _draw(output: Output, tree: xr.DataTree, folder: Path) -> None:
 
     from . import style
 
-    single = [(output.name, style.styled(_single), {"output": output})]
+    single = [(output.name, style.draw_alone, {"name": output.name, "draw": output.draw})]
     drawn: Any = single if output.draw else import_name(output.plot)(tree)
     for stem, plot, selection in drawn:
         figure = np.ravel(plot(tree, **selection))[0].figure
         for ending, content in style.png_and_pdf(figure).items():
             write_bytes(folder / f"{stem}.{ending}", content)
         plt.close(figure)
-
-
-def _single(tree: xr.DataTree, output: Output) -> "Axes":
-    """Draw the figure of an output that draws on one panel."""
-    from . import style
-
-    assert output.draw
-    _, ((panel,),) = style.panels(None, figsize=(style.COLUMN_WIDTH, 2.4))
-    output.draw(panel, tree[output.name].to_dataset())
-    return panel
 
 
 # -- the page of all tables --------------------------------------------------------------------------------------------

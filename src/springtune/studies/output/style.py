@@ -163,9 +163,12 @@ def panels(
     return None, given.reshape(nrows, ncols)
 
 
-def size(figure: Figure | SubFigure) -> tuple[float, float]:
-    """Width and height of a figure or subfigure [inch]."""
-    return figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
+@styled
+def draw_alone(tree: "xr.DataTree", name: str, draw: Callable[[Axes, Any], object]) -> Axes:
+    """Draw a group of a dataset on a single panel."""
+    _, ((panel,),) = panels(None, figsize=(COLUMN_WIDTH, 2.4))
+    draw(panel, tree[name].to_dataset())
+    return panel
 
 
 def png_and_pdf(figure: Figure) -> dict[str, bytes]:
@@ -296,7 +299,7 @@ def add_title(figure: Figure | SubFigure | None, title: str, said: str = "") -> 
     """Write the title of a figure, and a note below all panels, wrapped to its width."""
     if figure is None:
         return
-    width = size(figure)[0]
+    width = figure.bbox.width / figure.dpi
     figure.suptitle(wrap_to_width(title, width - 0.2, 8.5), x=0.05 / width, ha="left")
     if said:
         said = wrap_to_width(said, width - 0.2)

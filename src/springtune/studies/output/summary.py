@@ -46,10 +46,10 @@ def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFI
     for name, (error, reference) in COMPARED.items():
         if name in groups and "definition" in groups[name].get(error, groups[name]).dims:
             finite = variables(groups["/finite_strain"]) if name == "/" and "/finite_strain" in groups else {}
-            cells = requested_cells(variables(groups[name]), finite, error)
-            lines += _errors(cells, groups[name][error], cells[reference], finite, most)
+            found = requested_cells(variables(groups[name]), finite, error)
+            lines += _errors(found, groups[name][error], found[reference], finite, most)
             if name == "/":  # of shapes quantities have errors
-                lines += _stiffness_to_type(cells)
+                lines += _stiffness_to_type(found)
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == "/" else name.strip("/"))
