@@ -271,7 +271,14 @@ def _is_being_written(path: Path) -> bool:
     number, _, host = path.name.removesuffix(UNFINISHED_ENDING).rpartition(".")[2].partition("@")
     if host not in ("", writer().partition("@")[2]):
         return time.time() < path.stat().st_mtime + ABANDONED_SECONDS
-    return number.isdecimal() and is_running(int(number))
+    import psutil  # here: hardly ever is there something to ask
+
+    try:
+        return psutil.Process(int(number)).status() != psutil.STATUS_ZOMBIE
+    except (OverflowError, ValueError, psutil.NoSuchProcess):
+        return False
+    except psutil.AccessDenied:
+        return True
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
@@ -288,18 +295,6 @@ def write_text(path: str | Path, text: str) -> None:
 def write_json(path: str | Path, content: Any) -> None:
     """Write JSON atomically."""
     write_text(path, json.dumps(content, indent=1) + "\n")
-
-
-def is_running(pid: int) -> bool:
-    """Return whether a process runs."""
-    import psutil  # here: hardly ever is there something to ask
-
-    try:
-        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
-    except (OverflowError, ValueError, psutil.NoSuchProcess):
-        return False
-    except psutil.AccessDenied:
-        return True
 
 
 UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff\ud800-\udfff]")

@@ -11,10 +11,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
 from functools import cache
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import pint
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,17 +130,11 @@ def _article(dimension: str) -> str:
 
 
 @cache
-def _registry() -> "pint.UnitRegistry[float]":
-    import pint  # here, since few studies need it
-
-    return pint.UnitRegistry()
-
-
-@cache
 def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     if _OTHER_NUMBER.search(_POWER.sub("", unit)):  # pint would evaluate 9^9^9^9
         return None
-    registry = _registry()
+    from pint import application_registry as registry  # here, since few studies need it
+
     try:
         given = registry.parse_units(unit)
         size = registry.Quantity(1.0, given).to_base_units().magnitude

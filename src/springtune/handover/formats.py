@@ -155,13 +155,10 @@ TABLES = {
 """Arrays that stand beside each other in a table."""
 
 
-def companions(path: Path) -> dict[str, Path]:
-    """Tables beside the table of springs, such as ``net.particles.csv``, by their content."""
-    return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in ("particles", *CELL_ARRAYS.values())}
-
-
 def _write_csv(path: Path, net: Net) -> list[Path]:
-    arrays, others, terms = arrays_of(net), companions(path), _by_corners(net.energies)
+    arrays, terms = arrays_of(net), _by_corners(net.energies)
+    tables_beside = ("particles", *CELL_ARRAYS.values())  # such as net.particles.csv
+    others = {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in tables_beside}
     texts = {others["particles"]: _csv_text(arrays, TABLES["particles"])}
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):

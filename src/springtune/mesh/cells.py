@@ -237,11 +237,11 @@ class Mesh:
         -------
         bool
         """
-        for count, corners in self.cells.items():
-            for i in range(1 if count == 3 else count):
-                if (signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) <= 0).any():
-                    return True
-        return False
+        return any(
+            (signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) <= 0).any()
+            for count, corners in self.cells.items()
+            for i in range(1 if count == 3 else count)
+        )
 
 
 def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:

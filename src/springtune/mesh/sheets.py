@@ -188,13 +188,10 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
     components = connected(edges, len(points))
     count = components.max() + 1
     for number in range(count):
-        of_body = components == number if count > 1 else slice(None)
-        free = "" if held[of_body].all() else free_motion(points[of_body], held[of_body])
-        if free:
-            body = "the body"
-            if count > 1:
-                body = f"one of the {count} bodies that are not joined, at {in_words(points[of_body])},"
-            raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
+        own, fixed = points[components == number], held[components == number]
+        if not fixed.all() and (free := free_motion(own, fixed)):
+            one = f"one of the {count} bodies that are not joined, at {in_words(own)},"
+            raise ValueError(f"{where}: its supports leave {one if count > 1 else 'the body'} free to {free}; hold it")
 
 
 def free_motion(points: np.ndarray, held: np.ndarray) -> str:
