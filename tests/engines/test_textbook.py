@@ -415,7 +415,7 @@ def test_triangles_of_vbd_have_lame_constants():
 def test_xpbd_refuses_springs_that_it_leaves_out():
     given = net("patch")
     given.stiffness[0] *= -1
-    with pytest.raises(st.EngineError, match="negative stiffness, which Newton's XPBD leaves out"):
+    with pytest.raises(st.EngineError, match="negative stiffness, and Newton's XPBD leaves these out"):
         st.ENGINES["newton-xpbd"].function(given, st.Setting(), 0.0)
 
 

@@ -267,17 +267,19 @@ def target_option(name: str, meaning: str, required: bool = False) -> Callable[[
 Options = dict[str, dict[str, Any]]
 """Options of a command by name, with keywords as click takes them."""
 
+BODY_OPTIONS: Options = {
+    "beam": {"help": "Length x height in mm, such as 200x40."},
+    "study": {"help": f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}; a file with one shape is enough."},
+    "thickness": {"default": "1 mm", "show_default": True, "help": "Thickness of a beam."},
+}
+"""Options of a body."""
+
 
 def sheet_options(
     mesh_help: str, density_help: str, mesh_type: str | None = None
 ) -> Callable[[AnyCommand], AnyCommand]:
     """Decorator that adds options of a body, its mesh and its material to a command, which gets them in `sheet`."""
-    each: Options = {
-        "beam": {"help": "Length x height in mm, such as 200x40."},
-        "study": {
-            "help": f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}; the name only where it has several."
-        },
-        "thickness": {"default": "1 mm", "show_default": True, "help": "Thickness of a beam."},
+    each = BODY_OPTIONS | {
         "mesh": {"default": mesh_type, "show_default": True, "help": mesh_help},
         "size": {"help": "Length of an edge, such as '2 mm'; of mesh files only if a shape has several."},
         "unit": {"default": "1 m", "show_default": True, "help": "Unit of the coordinates in a beam's mesh file."},

@@ -370,13 +370,11 @@ def fit_engine(
     found = factor == factor
     why = why or ("" if _is_at_rest(tuned) else tuned.message)
     notes = why, tuned.drifts if abs(tuned.drift) > MOST_DRIFT else "", scene.objection
-    numbers = chosen.numbers(net_of(scene, factor), setting) if found else {}
-    typed = {name: value for name, value in numbers.items() if name in chosen.parameters}
+    typed = chosen.numbers(net_of(scene, factor), setting) if found else {}
     bands = TabledList(_band(runs, name, tuned) for name in names if found)
     raised = ("substeps", "iterations") if chosen.iterates else ("substeps",)
     settings = TabledList(_needed(runs, name, setting) for name in raised if needed)
-    message = "; ".join(filter(None, notes))
-    return EngineFit(scene, factor, tuned, untuned, typed, bands, settings, message, spread)
+    return EngineFit(scene, factor, tuned, untuned, typed, bands, settings, "; ".join(filter(None, notes)), spread)
 
 
 def _typed_rows(engine: Engine, typed: Mapping[str, Any], mesh: Mesh) -> Iterator[tuple[str, str, str, str]]:

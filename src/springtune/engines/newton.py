@@ -23,7 +23,7 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.newton import colours, membrane, membrane_energies
-from .base import SPRING_STIFFNESS, EngineError, Parameter, Session, Setting, engine
+from .base import SPRING_STIFFNESS, Parameter, Session, Setting, engine, refuse_pushing_springs
 
 LARGEST_VELOCITY = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
@@ -57,9 +57,8 @@ class _Session:
     """A model of Newton, damped over mass."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float, solver: str) -> None:
-        if solver == "XPBD" and np.any(net.stiffness < 0):
-            why = "has springs of negative stiffness, which Newton's XPBD leaves out; take 'patch' or 'lattice'"
-            raise EngineError(f"definition '{net.header['definition']}': {why}")
+        if solver == "XPBD":
+            refuse_pushing_springs(net, "Newton's XPBD leaves these out")
         middle = (net.points.min(axis=0) + net.points.max(axis=0)) / 2  # small numbers lose least by rounding
         with _quiet():
             import newton

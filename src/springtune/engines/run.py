@@ -294,9 +294,8 @@ def in_engine(
     if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_ITERATIONS:
         why = f"{asked} frames of {setting} are over {MOST_ITERATIONS:.0e} iterations"
         raise EngineError(f"dt: {why}; take a longer dt, or fewer substeps")
-    extent = float(np.ptp(net.points, axis=0).max())
     rest = REST_TOLERANCES[setting.precision] if tolerance is None else number(tolerance, "tolerance")
-    ended = follow(session, window, asked, rest, extent)
+    ended = follow(session, window, asked, rest, float(np.ptp(net.points, axis=0).max()))
     ended = replace(ended, displacements=ended.displacements[places])
     if ended.status == "rest" and scene.network.inverted(ended.displacements):
         message = "at rest with cells turned inside out; take shorter steps, or less load"
@@ -358,21 +357,24 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
     """Advance a session until it rests: the way left, extrapolated from the last changes, is below `tolerance`."""
     seen: list[np.ndarray] = []
     seconds: list[float] = []  # a frame
+
+    def ended(displacements: np.ndarray, status: str, message: str, swing: float) -> Ended:
+        later = seconds[1:]  # the first frames may compile
+        return Ended(displacements, status, message, done, float(np.median(later)) if later else np.nan, swing)
+
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
         looks, size_of_window = [], min(window, most - done)
         each = ceil(size_of_window / LOOKS_PER_WINDOW)
         for begun in range(0, size_of_window, each):
-            count = min(each, size_of_window - begun)
-            begin = time.perf_counter()
+            count, begin = min(each, size_of_window - begun), time.perf_counter()
             session.advance(count)
             seconds.append((time.perf_counter() - begin) / count)
-            done += count
-            now = session.displacements()
+            done, now = done + count, session.displacements()
             size = float(np.abs(now).max())
             if not size <= DIVERGED_EXTENTS * extent:
                 message = f"diverged within {done} frames; take more substeps, or a smaller stiffness"
-                return Ended(np.full(now.shape, np.nan), "diverged", message, done, _frame_seconds(seconds), np.nan)
+                return ended(np.full(now.shape, np.nan), "diverged", message, np.nan)
             looks.append(now)
         window_seen = np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)])
         seen = [*seen[1 - SWING_WINDOWS :], window_seen]
@@ -386,13 +388,13 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
         last, before = now, change
         trembles = len(seen) == SWING_WINDOWS and _swing(seen) <= tolerance * size and _oscillates(seen)
         if calm == REST_WINDOWS or trembles:
-            return Ended(now, "rest", "", done, _frame_seconds(seconds), 0.0)
+            return ended(now, "rest", "", 0.0)
     swing = _swing(seen[len(seen) // 2 :])
     if len(seen) > 1 and _oscillates(seen) and swing > STEADY_SWING_RATIO * _swing(seen[: len(seen) // 2]):
         message = f"swings by {1e3 * swing:.3g} mm about its mean after {done} frames; take more substeps or damping"
-        return Ended(_mean(seen), "swings", message, done, _frame_seconds(seconds), swing)
+        return ended(_mean(seen), "swings", message, swing)
     message = f"not at rest after {done} frames, still moving by {1e3 * change:.3g} mm in {window}; give more frames"
-    return Ended(now, "moving", message, done, _frame_seconds(seconds), swing)
+    return ended(now, "moving", message, swing)
 
 
 def _mean(seen: list[np.ndarray]) -> np.ndarray:
@@ -411,11 +413,6 @@ def _oscillates(seen: list[np.ndarray]) -> bool:
     middle = len(seen) // 2
     drift = float(np.abs(_mean(seen[middle:]) - _mean(seen[:middle])).max())
     return _swing(seen[middle:]) > 2 * drift
-
-
-def _frame_seconds(seconds: list[float]) -> float:
-    """Median seconds of a frame, without the first frames, which may compile; NaN without others."""
-    return float(np.median(seconds[1:])) if seconds[1:] else np.nan
 
 
 def frame_text(seconds: float) -> str:

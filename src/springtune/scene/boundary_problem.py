@@ -227,6 +227,8 @@ class BeamProblem(BoundaryProblem):
 class ShapeProblem(BoundaryProblem):
     """A shape under one of its load cases, times `scale` [1]."""
 
+    scale: float
+
     def __init__(
         self,
         shape: Shape,

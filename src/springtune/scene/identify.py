@@ -427,8 +427,7 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
         odd.append(f"{name}: is below zero, as of few materials; {remedy}")
     values = {name: float(value) for name, value in constants.items()}
     intervals = {name: (float(low[name]), float(high[name])) for name in constants}
-    noises = dict(zip(residuals, noise.tolist()))
-    places = {block.label: block.places for block in model.blocks}
+    noises, places = dict(zip(residuals, noise.tolist())), {block.label: block.places for block in model.blocks}
     return Identified(law, values, intervals, tuple(lacking), (*notes, *odd), noises, residuals, {}, places)
 
 
@@ -489,18 +488,18 @@ def find_measurements(values: np.ndarray, columns: np.ndarray, places: np.ndarra
         gone |= ((sizes > 2) & (np.bincount(group, far[:, number]) >= sizes / 2))[group]
     rest = np.flatnonzero(~gone)
     if len(rest) >= FEWEST_POINTS:
-        near = _nearest(places[rest])[1][:, 1:]
+        near = _nearest(places[rest])[:, 1:]
         alone = np.abs(apart[rest] - np.median(apart[rest][near], axis=1))
         own = np.maximum(DEVIATION_OVER_MEDIAN * np.median(alone, axis=0), floor)
         gone[rest[(far[rest] & (alone > limit * own)).any(axis=1)]] = True
     return ~gone
 
 
-def _nearest(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distances and numbers of the nearest places of each, itself first; loads of curves are counted."""
+def _nearest(places: np.ndarray) -> np.ndarray:
+    """Numbers of the nearest places of each, itself first; loads of curves are counted."""
     one = places.ndim == 1
     at = np.argsort(np.argsort(places, kind="stable"))[:, None] if one else places
-    return KDTree(at).query(at, k=min(len(at), 5 if one else 9))
+    return KDTree(at).query(at, k=min(len(at), 5 if one else 9))[1]
 
 
 def correlation_excess(residual: np.ndarray, places: np.ndarray) -> float:
@@ -511,7 +510,7 @@ def correlation_excess(residual: np.ndarray, places: np.ndarray) -> float:
         order = np.argsort(places, kind="stable")
         pairs = np.stack([order[:-1], order[1:]])
     else:
-        near = _nearest(places)[1][:, :5]
+        near = _nearest(places)[:, :5]
         pairs = np.unique(np.sort([np.repeat(near[:, 0], 4), near[:, 1:].ravel()], axis=0), axis=1)
     found = (residual[pairs[0]] * residual[pairs[1]]).mean() / (residual**2).mean()
     return float(found - CORRELATION_DEVIATIONS / np.sqrt(pairs.shape[1] * residual.shape[1]))

@@ -184,11 +184,9 @@ class MeshCache:
         """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
         sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
         if self._typical is None or self._typical[0] is not sizes:
-            outline = self.mesh.on_outline
-            inside, around = sizes[~outline], sizes[outline]
-            found = {"inside": np.median(inside) if len(inside) else np.nan}
-            found |= {"outline": np.median(around) if len(around) else np.nan}
-            found |= {"least": sizes.min(), "most": sizes.max()}
+            around = self.mesh.on_outline
+            found = {"inside": np.nan if around.all() else np.median(sizes[~around])}
+            found |= {"outline": np.median(sizes[around]), "least": sizes.min(), "most": sizes.max()}
             self._typical = sizes, found
         return {name: float(springs.reference * value) for name, value in self._typical[1].items()}
 

@@ -76,8 +76,7 @@ class Moduli:
         """Norm of the difference of `stiffness` from the material's, over the norm of the material's [1]."""
         wanted = self.material.in_plane.plane_stress
         # Twice the shear and its couplings: the norm of the tensor, which no turn of the axes changes.
-        weights = np.sqrt([1.0, 1.0, 2.0])
-        weights = weights[:, None] * weights
+        weights = np.sqrt(np.outer([1.0, 1.0, 2.0], [1.0, 1.0, 2.0]))
         return float(np.linalg.norm(weights * (self.stiffness - wanted)) / np.linalg.norm(weights * wanted))
 
 
@@ -98,12 +97,10 @@ class MeshModuli:
         name = springs.relative.tobytes(), springs.lateral, *(energy.key for energy in springs.energies)
         if name not in self._found:
             self._found[name] = *self._test.axial(springs), self._test.shear(springs)
-        young_modulus, poisson_ratio, shear_modulus = self._found[name]
+        young, poisson, shear = self._found[name]
         wanted = material.in_plane
-        scale = wanted.young_modulus * self.sheet.thickness
-        young_modulus_error = young_modulus * springs.reference / scale - 1
-        shear_modulus_error = shear_modulus * springs.reference / scale * 2 * (1 + wanted.poisson_ratio) - 1
-        return Moduli(young_modulus_error, poisson_ratio, shear_modulus_error, *origin)
+        scale = springs.reference / (wanted.young_modulus * self.sheet.thickness)
+        return Moduli(young * scale - 1, poisson, shear * scale * 2 * (1 + wanted.poisson_ratio) - 1, *origin)
 
 
 def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
@@ -170,8 +167,6 @@ class BestSprings(Tabled):
         the largest load's counts at least.
     stretch_error : float
         Worst error of a spring's stretch there, over the largest one that it has under a load of the same energy [1].
-    further_error : float
-        Worst error of the energy under quartic and quintic stresses [1], which are not fitted.
     lower_bound : float or None
         Proven: no stiffnesses >= 0 on this mesh have a smaller `stretch_error` [1]. None where negative ones are
         allowed.
@@ -290,9 +285,9 @@ def best_springs(
         found[name] = space.search(springs.relative * springs.reference / scale, False, evaluations)
     if negative:
         found = {name: space.search(stiffness, True, evaluations) for name, (stiffness, _, _) in found.items()}
-    stiffness = min(found.values(), key=lambda one: one[1])[0]
-    springs = Springs(scale, stiffness, evaluations=sum(count for _, _, count in found.values()))
+    each, values, counts = zip(*found.values())
+    stiffness = each[np.argmin(values)]
+    springs, objectives = Springs(scale, stiffness, evaluations=sum(counts)), dict(zip(found, values))
     errors, bound = space.errors(stiffness), None if negative else space.stretch_bound()
-    objectives = {name: value for name, (_, value, _) in found.items()}
     seconds = time.perf_counter() - begin
     return BestSprings(springs, space.mesh, material, thickness, negative, *errors, bound, objectives, seconds)
