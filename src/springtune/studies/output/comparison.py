@@ -1,7 +1,5 @@
 """Compare two datasets cell by cell, with tolerances."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Files for other programs: a group of a dataset as one long table, and a VTU file of each scene with fields."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping
