@@ -269,7 +269,7 @@ Options = dict[str, dict[str, Any]]
 
 BODY_OPTIONS: Options = {
     "beam": {"help": "Length x height in mm, such as 200x40."},
-    "study": {"help": f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}; a file with one shape is enough."},
+    "study": {"help": f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}; the name only of several."},
     "thickness": {"default": "1 mm", "show_default": True, "help": "Thickness of a beam."},
 }
 """Options of a body."""
