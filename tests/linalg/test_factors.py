@@ -17,7 +17,8 @@ from springtune.linalg.multigrid import IndefiniteError, Multigrid, chunked, den
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINS_FROM_UNKNOWNS, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
-from springtune.problem.loads import AXIAL, held, weights
+from springtune.problem.boundary import held, weights
+from springtune.problem.loads import AXIAL
 from springtune.springs.lattice import half_weight
 
 from tables import beside, cases

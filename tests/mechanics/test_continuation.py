@@ -9,7 +9,8 @@ import springtune as st
 from springtune.mechanics.continuation import buckling, follow, smallest_share
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR, weights
+from springtune.problem.boundary import weights
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.reference.answers import elastica
 from springtune.scene.mesh_cache import MeshCache
 

@@ -14,7 +14,8 @@ from springtune.mechanics.dynamics import Motion, masses, relax
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh.rows import lattice
-from springtune.problem.loads import AXIAL, BENDING, held, weights
+from springtune.problem.boundary import held, weights
+from springtune.problem.loads import AXIAL, BENDING
 from springtune.springs.lattice import uniform
 
 from problems import CountedNetwork

@@ -14,7 +14,8 @@ from springtune.mechanics import energies
 from springtune.mechanics.network import FollowerPressure
 from springtune.mechanics.newton import MOST_MODES
 from springtune.mechanics.statics import FAR_STRETCH
-from springtune.problem.loads import FACE, measured
+from springtune.problem.boundary import measured
+from springtune.problem.loads import FACE
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
 

@@ -9,8 +9,9 @@ import springtune as st
 from springtune.mechanics.continuation import follow, smallest_share
 from springtune.mechanics.series import StablePath
 from springtune.mechanics.statics import SERIES_ORDER, Expansion, StaticProblem
+from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import best_stiffness
-from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR, held, measured, weights
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.lattice import COEFFICIENT, uniform

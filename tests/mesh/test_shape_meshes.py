@@ -14,7 +14,7 @@ from springtune.mesh.cells import quality, signed_areas
 from springtune.mesh.formats import read_shape, write_mesh
 from springtune.mesh.free import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
-from springtune.problem.loads import check_case
+from springtune.problem.boundary import check_case
 
 from tables import beside, cases, evaluated
 

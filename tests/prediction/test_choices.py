@@ -10,7 +10,7 @@ import springtune as st
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.prediction.choices import USUAL_LOADS, predicted, references
-from springtune.problem.loads import held, weights
+from springtune.problem.boundary import held, weights
 
 from problems import pulled
 from tables import slow_but

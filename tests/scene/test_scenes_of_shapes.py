@@ -13,7 +13,7 @@ from springtune.mechanics.continuation import follow
 from springtune.mechanics.continuum import cell_stresses, particle_stresses
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.problem.loads import cell_at, displacement_weights, forces
+from springtune.problem.boundary import cell_at, displacement_weights, forces
 from springtune.problem.shapes import AssumptionWarning
 
 from problems import asked, free_network

@@ -125,7 +125,7 @@ class Commands(click.Group):
             lines = error.args if all(isinstance(one, str) for one in error.args) else (str(error),)
             command = self.get_command(ctx, ctx.invoked_subcommand or "")
             said = "\n".join(shown(name_option(line, command)) for line in lines)
-            wrong = getattr(error, "wrong_call", said.startswith("--"))
+            wrong = said.startswith("--")
             raise (WrongCall if wrong else click.ClickException)(said) from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.simulation import EquilibriumWarning, simulate
+from ..problem.boundary import displacement_weights
 from ..problem.compare import error_text
-from ..problem.loads import displacement_weights
 from ..safe_io import Tabled, number_text
 from ..scene.single import Result, Scene
 from .base import ENGINES, Engine, EngineError, Session, Setting, count, number

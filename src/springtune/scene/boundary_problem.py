@@ -13,7 +13,7 @@ from ..mechanics.network import FollowerPressure, Network
 from ..mesh.cells import Mesh
 from ..mesh.sheets import GroupedMesh, box_fault, part_names, parts_of
 from ..mesh.sides import OutlineSide, in_words
-from ..problem import loads
+from ..problem import boundary
 from ..problem.loads import LOADS, Load, LoadKind
 from ..problem.materials import AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
@@ -111,7 +111,7 @@ class BoundaryProblem(ABC):
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
         densities = {name: one.density for name, one in self.by_part.items()}
-        return None if None in densities.values() else loads.particle_masses(self.grouped, self.thickness, densities)
+        return None if None in densities.values() else boundary.particle_masses(self.grouped, self.thickness, densities)
 
     def solve(self, springs: Springs) -> Solution:
         """Equilibrium, judged; its displacement is the first quantity of interest."""
@@ -123,7 +123,7 @@ class BoundaryProblem(ABC):
         """First displacement among the quantities [m]; NaN where there is none."""
         for one in self.case.quantities:
             if one.kind == "displacement":
-                return float(np.tensordot(displacements, loads.displacement_weights(self.grouped, one), axes=2))
+                return float(np.tensordot(displacements, boundary.displacement_weights(self.grouped, one), axes=2))
         return np.nan
 
     def none(self) -> dict[str, float]:
@@ -143,7 +143,7 @@ class BoundaryProblem(ABC):
         """Quantity of interest at displacements [m], in SI units."""
         linear = self.kinematics == "linear"
         if one.kind == "displacement":
-            return float(np.tensordot(moved, loads.displacement_weights(self.grouped, one), axes=2))
+            return float(np.tensordot(moved, boundary.displacement_weights(self.grouped, one), axes=2))
         if one.kind == "area":
             return _growth(self.mesh, moved, linear)
         if one.kind == "energy":
@@ -151,11 +151,11 @@ class BoundaryProblem(ABC):
                 return float(0.5 * springs.reference * np.tensordot(moved, network.linear_forces_over_k(moved), axes=2))
             return springs.reference * network.energy_over_k(moved)
         if one.kind == "reaction":
-            weights = loads.reaction_weights(self.grouped, self.case, one)
+            weights = boundary.reaction_weights(self.grouped, self.case, one)
             return float(np.tensordot(self.reactions(springs, network, moved), weights, axes=2))
         from ..mechanics.continuum import cell_stresses, particle_stresses  # here: few ask for stress
 
-        corners, cell, shares = loads.cell_at(self.grouped, one.of)
+        corners, cell, shares = boundary.cell_at(self.grouped, one.of)
         stresses, names = cell_stresses(network, moved, linear), part_names(self.grouped)
         same = {count: labels == names[corners][cell] for count, labels in names.items()}
         found = shares @ particle_stresses(self.mesh, stresses, same)[self.mesh.cells[corners][cell]]
@@ -264,14 +264,14 @@ class ShapeProblem(BoundaryProblem):
             self._check(one)
 
     def _loading(self) -> Loading:
-        loads.check_case(self.grouped, self.case)
-        held, given = loads.supported(self.grouped, self.case)
+        boundary.check_case(self.grouped, self.case)
+        held, given = boundary.supported(self.grouped, self.case)
         densities = {name: one.density for name, one in self.by_part.items()}
-        all_forces = partial(loads.forces, self.grouped, self.case, self.thickness, densities)
+        all_forces = partial(boundary.forces, self.grouped, self.case, self.thickness, densities)
         pattern = all_forces()
         if not (pattern[~held].any() or given.any()):
             raise ValueError(f"load {self.load!r}: neither pulls what is free nor moves a support; give a force")
-        edges, pressure = loads.followed(self.grouped, self.case, self.thickness)
+        edges, pressure = boundary.followed(self.grouped, self.case, self.thickness)
         turning = self.kinematics == "nonlinear" and len(edges) > 0
         key = self.grouped, self.case, self.thickness, tuple(densities.items()), turning
         follower = FollowerPressure(self.mesh, edges, pressure) if turning else None
@@ -281,11 +281,11 @@ class ShapeProblem(BoundaryProblem):
     def _check(self, one: Quantity) -> None:
         """Refuse a quantity that cannot be read."""
         if one.kind == "displacement":
-            loads.displacement_weights(self.grouped, one)
+            boundary.displacement_weights(self.grouped, one)
         elif one.kind == "reaction":
-            loads.reaction_weights(self.grouped, self.case, one)
+            boundary.reaction_weights(self.grouped, self.case, one)
         elif one.kind == "stress":
-            loads.cell_at(self.grouped, one.of)
+            boundary.cell_at(self.grouped, one.of)
             particle = self.grouped.particle(one.of)
             found = set()
             for count, labels in part_names(self.grouped).items():

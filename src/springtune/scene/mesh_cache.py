@@ -17,7 +17,8 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh.cells import Mesh, share_edges
 from ..mesh.sheets import GroupedMesh
-from ..problem.loads import LoadKind, held, loaded_box, measured, side_edges, weights
+from ..problem.boundary import held, loaded_box, measured, side_edges, weights
+from ..problem.loads import LoadKind
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
 from ..problem.quantities import Status, nearest
 from ..problem.shapes import Beam

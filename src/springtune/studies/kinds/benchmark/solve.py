@@ -17,8 +17,9 @@ from springtune.mechanics import PRECISIONS
 from springtune.mechanics.stepping import make_stepper
 from springtune.mesh.cells import MESH_TYPES
 from springtune.mesh.rows import structured
+from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import assured, deformation_error
-from springtune.problem.loads import LOADS, held, measured, weights
+from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material, material_of
 from springtune.problem.quantities import Status
 from springtune.problem.shapes import Beam

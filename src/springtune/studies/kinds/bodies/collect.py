@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.compare import deformation_error
-from springtune.problem.loads import FACE_POSITIONS, LOADS
+from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
 from springtune.problem.quantities import OF_BODIES, SWEPT, Status
 from springtune.problem.shapes import QUANTITY_UNITS

@@ -609,7 +609,7 @@ def _check_file(name, shape, file, path, problems, extents):
     # Here, since few studies have files, and reading one takes scipy.
     from springtune.mesh.formats import read_shape
     from springtune.mesh.sheets import parts_of
-    from springtune.problem.loads import check_case
+    from springtune.problem.boundary import check_case
 
     try:
         grouped = read_shape(file, shape.unit)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from springtune.mechanics.statics import SingularError
-from springtune.problem.loads import FACE_POSITIONS, LOAD_KINDS, Load, check_case
+from springtune.problem.boundary import FACE_POSITIONS, check_case
+from springtune.problem.loads import LOAD_KINDS, Load
 from springtune.problem.materials import material_of
 from springtune.problem.quantities import Status
 from springtune.problem.shapes import Beam

@@ -15,7 +15,8 @@ from springtune.mechanics.continuum import PatchTest
 from springtune.mechanics.dynamics import Motion, relax
 from springtune.mechanics.statics import SingularError, StaticProblem
 from springtune.mesh.cells import MESH_TYPES, Mesh, corner_angles
-from springtune.problem.loads import AXIAL, FACE, weights
+from springtune.problem.boundary import weights
+from springtune.problem.loads import AXIAL, FACE
 from springtune.problem.materials import Material, material_of
 from springtune.problem.quantities import Status
 from springtune.problem.shapes import Beam
