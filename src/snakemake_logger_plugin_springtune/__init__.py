@@ -15,11 +15,9 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 from springtune.safe_io import clock as clock_text
 
-PAUSE = 0.5
-"""Time between two updates of the moving line [s]."""
+PAUSE = 0.5  # time between two updates of the moving line [s]
 
-LINE = "\r\x1b[?7l{}\x1b[K\x1b[?7h"
-"""Overwrites the line of the cursor; the terminal cuts long lines."""
+LINE = "\r\x1b[?7l{}\x1b[K\x1b[?7h"  # overwrites the line of the cursor; the terminal cuts long lines
 
 NUMBERS = {LogEvent.JOB_INFO: "jobid", LogEvent.JOB_FINISHED: "job_id", LogEvent.JOB_ERROR: "jobid"}
 """Attribute of a record with the job's number, by event: the job runs, is done, or failed."""

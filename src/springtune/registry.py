@@ -32,8 +32,7 @@ class PluginWarning(UserWarning):
     """An entry point of another package is left out; the message says why."""
 
 
-GROUPS = ("definitions", "engines", "loads", "mesh_types")
-"""Groups of entry points, after ``springtune.``."""
+GROUPS = ("definitions", "engines", "loads", "mesh_types")  # groups of entry points, after ``springtune.``
 
 
 @cache

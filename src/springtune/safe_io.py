@@ -18,12 +18,10 @@ from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
-LARGEST_CSV = 5_000_000
-"""Bytes of the largest CSV file that is read."""
+LARGEST_CSV = 5_000_000  # bytes of the largest CSV file that is read
 
 
-_memory_lock = threading.RLock()
-"""Lock: a memory limit applies to the whole process."""
+_memory_lock = threading.RLock()  # lock: a memory limit applies to the whole process
 
 
 class BeyondSize(ValueError):
@@ -63,8 +61,7 @@ def read(path: str | Path, most: int) -> bytes:
     return found
 
 
-Rows = list[tuple[int, list[str]]]
-"""Rows of a CSV file with their line numbers."""
+Rows = list[tuple[int, list[str]]]  # rows of a CSV file with their line numbers
 
 
 DECIMAL = re.compile(r"[+-]?\d*[.,]\d*(?:[eE][+-]?\d+)?")
@@ -300,8 +297,7 @@ def write_json(path: str | Path, content: Any) -> None:
 UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff\ud800-\udfff]")
 """Control characters, line breaks, bidirectional marks, surrogates and what is no character in XML."""
 
-PUNCTUATION = re.compile(r"([^\w\s]|_)")
-"""Characters that a markup language may interpret."""
+PUNCTUATION = re.compile(r"([^\w\s]|_)")  # characters that a markup language may interpret
 
 
 def shown(text: object) -> str:
@@ -406,8 +402,7 @@ def html_table(name: str, rows: Iterable[Sequence[object]], heads: Iterable[obje
     return f"<div><b>{escape(name)}</b><table>{table}</table></div>"
 
 
-WRAPPED = 30
-"""Characters from which a cell may have several lines."""
+WRAPPED = 30  # characters from which a cell may have several lines
 
 
 def _cell(tag: str, content: object) -> str:

@@ -28,8 +28,7 @@ class Dimension:
         return f"{_article(self.name)} such as '{self.example}'"
 
 
-DEGREE = "0.01745329251994329576923690768488612713"
-"""A degree [rad]."""
+DEGREE = "0.01745329251994329576923690768488612713"  # A degree [rad]
 
 QUANTITY_DIMENSIONS = {
     dimension.name: dimension
@@ -65,8 +64,7 @@ _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
 _POWERS = str.maketrans({"²": "^2", "³": "^3"})
 _OF_PRINT = re.compile("pixel|point|pica|didot|cicero|dot")
 
-LONGEST_QUANTITY = 100
-"""Most characters of a quantity."""
+LONGEST_QUANTITY = 100  # most characters of a quantity
 
 _POWER = re.compile(r"(?<![\d\s^*/(.+-])\s*\^\s*[+-]?[\d.]{1,3}(?![\d^.])")
 _OTHER_NUMBER = re.compile(r"\^|(?<![\w.])(?!1(?![\w.]))[\d.]")

@@ -28,8 +28,7 @@ def command(*lines: str, **settings: Any) -> Callable[..., click.Command]:
     return click.command(epilog=examples(*lines), **settings)
 
 
-PATH: click.Path = click.Path(path_type=Path)
-"""Type of options and arguments that are paths."""
+PATH: click.Path = click.Path(path_type=Path)  # type of options and arguments that are paths
 
 
 class WrongCall(click.ClickException):
@@ -80,8 +79,7 @@ def name_option(message: str, command: click.Command | None) -> str:
     return message
 
 
-COMPLETION = "_SPRINGTUNE_COMPLETE"
-"""Environment variable by which a shell asks click for completions."""
+COMPLETION = "_SPRINGTUNE_COMPLETE"  # environment variable by which a shell asks click for completions
 
 
 class EscapedStream:

@@ -88,8 +88,7 @@ MISSING = {
 }
 """Messages about missing options of a beam."""
 
-FOR_ENGINE = ("density", "load", "force")
-"""Options that an engine needs besides those of a beam."""
+FOR_ENGINE = ("density", "load", "force")  # options that an engine needs besides those of a beam
 
 
 # -- beams and shapes --------------------------------------------------------------------------------------------------
@@ -264,8 +263,7 @@ def target_option(name: str, meaning: str, required: bool = False) -> Callable[[
     )
 
 
-Options = dict[str, dict[str, Any]]
-"""Options of a command by name, with keywords as click takes them."""
+Options = dict[str, dict[str, Any]]  # options of a command by name, with keywords as click takes them
 
 BODY_OPTIONS: Options = {
     "beam": {"help": "Length x height in mm, such as 200x40."},

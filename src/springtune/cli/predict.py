@@ -32,8 +32,7 @@ ENGINE_OPTIONS: options.Options = {
 }
 """Options of `predict` that are of engines, as click takes them."""
 
-PROGRESS_SECONDS = 3
-"""Time between two lines on the progress of a search [s]."""
+PROGRESS_SECONDS = 3  # time between two lines on the progress of a search [s]
 
 
 class Progress(logging.Handler):

@@ -17,8 +17,7 @@ from . import PATH, WrongCall, command
 if TYPE_CHECKING:
     from ..studies.output.comparison import Change, Comparison, GroupChanges
 
-ROWS = 20
-"""Rows of a table."""
+ROWS = 20  # rows of a table
 
 COMPARED = ("before", "after")
 

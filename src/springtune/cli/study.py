@@ -23,8 +23,7 @@ from . import PATH, WrongCall, command
 if TYPE_CHECKING:
     from ..studies.config.model import Study
 
-MANUAL = "`springtune docs` prints where every key is explained"
-"""Comment in new studies."""
+MANUAL = "`springtune docs` prints where every key is explained"  # comment in new studies
 
 
 @command(

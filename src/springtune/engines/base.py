@@ -24,8 +24,7 @@ from ..problem.quantities import positive, put
 from ..registry import Declaration, Registry, how_to_install
 from ..safe_io import number_text
 
-MOST_STEPS, LONGEST_FRAME = 100_000, 1.0
-"""Most substeps and iterations, and the longest frame [s]."""
+MOST_STEPS, LONGEST_FRAME = 100_000, 1.0  # most substeps and iterations, and the longest frame [s]
 
 
 def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
@@ -138,8 +137,7 @@ class Parameter:
     formula: str
 
 
-SPRING_STIFFNESS = Parameter("N/m", "k of the definition, one for each spring")
-"""Stiffness of a spring."""
+SPRING_STIFFNESS = Parameter("N/m", "k of the definition, one for each spring")  # stiffness of a spring
 
 
 def typed_springs(net: SpringNet) -> dict[str, Any]:

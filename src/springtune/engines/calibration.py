@@ -27,8 +27,7 @@ from .run import MOST_DRIFT, EngineResult, drift, frame_text, in_engine, net_of,
 
 logger = logging.getLogger(__name__)
 
-LOAD_SHARES = (0.25, 0.5, 1.0, 2.0)
-"""Sizes of a load that a calibration is tried on, over its own."""
+LOAD_SHARES = (0.25, 0.5, 1.0, 2.0)  # sizes of a load that a calibration is tried on, over its own
 
 MOST_SPREAD = 0.05
 """Error up to which orders of the particles may differ from each other, and loads from a converged setting."""
@@ -40,8 +39,7 @@ BRACKET_RATIO, MOST_BRACKETS, SATURATED_CHANGE = 8.0, 7, 1e-3
 """Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
 which stiffness no longer decides."""
 
-TRIED_ORDERS = 4
-"""Orders of particles, springs and cells that a calibration is tried in."""
+TRIED_ORDERS = 4  # orders of particles, springs and cells that a calibration is tried in
 
 DAMPING_NOTE = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
 """Note on the damping of a run."""

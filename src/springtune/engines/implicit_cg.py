@@ -14,8 +14,7 @@ from ..mechanics.dynamics import Motion
 from ..mechanics.stepping import make_stepper
 from .base import Setting, energy_parameters, engine
 
-TOLERANCE = 1e-5
-"""Relative residual that ends conjugate gradients: SOFA's default."""
+TOLERANCE = 1e-5  # relative residual that ends conjugate gradients: SOFA's default
 
 
 @engine(

@@ -16,8 +16,7 @@ from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
 from .base import SPRING_STIFFNESS, EngineError, Parameter, Session, Setting, engine, version_numbers
 
-FLEX_SINCE = 4
-"""Version of MuJoCo from which on a flex has the law of plane stress."""
+FLEX_SINCE = 4  # version of MuJoCo from which on a flex has the law of plane stress
 
 TYPED = {
     "stiffness": SPRING_STIFFNESS,

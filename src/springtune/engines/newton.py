@@ -25,8 +25,7 @@ from ..handover.net import SpringNet
 from ..handover.newton import colours, membrane, membrane_energies
 from .base import SPRING_STIFFNESS, Parameter, Session, Setting, engine, refuse_pushing_springs
 
-LARGEST_VELOCITY = 1e30
-"""Largest velocity [m/s]: none. By default Newton has 1e5."""
+LARGEST_VELOCITY = 1e30  # largest velocity [m/s]: none. By default Newton has 1e5
 
 TRIANGLES = {
     "tri_ke": Parameter("N/m", "mu h = E h / (2 (1 + nu))"),

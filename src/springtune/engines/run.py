@@ -18,41 +18,32 @@ from ..safe_io import Tabled, number_text
 from ..scene.single import Result, Scene
 from .base import ENGINES, Engine, EngineError, Session, Setting, count, number
 
-MOST_PERCENTS = 2
-"""Displacement over the reference's from which its error is given in times."""
+MOST_PERCENTS = 2  # displacement over the reference's from which its error is given in times
 
 MOST_DRIFT = 0.05
 """Error across what is measured, over it, above which a note warns of it, and springs are not recommended."""
 
-MOST_ITERATIONS = 1_000_000_000
-"""Most frames times substeps times iterations of a run."""
+MOST_ITERATIONS = 1_000_000_000  # most frames times substeps times iterations of a run
 
-MOST_FRAMES = 600
-"""Frames after which a run ends that has not come to rest; more where the scene's period is long."""
+MOST_FRAMES = 600  # frames after which a run ends that has not come to rest; more where the scene's period is long
 
-LEAST_PERIODS = 30
-"""Periods of the loaded mode that a run has at least."""
+LEAST_PERIODS = 30  # periods of the loaded mode that a run has at least
 
-WINDOW_PERIODS = 0.5
-"""Time between two looks at a run, over the period of the loaded mode; at least a frame."""
+WINDOW_PERIODS = 0.5  # time between two looks at a run, over the period of the loaded mode; at least a frame
 
 REST_TOLERANCES = {"float64": 1e-7, "float32": 1e-4}
 """Distance from rest, over the largest displacement, that a run stops at, by precision."""
 
-DIVERGED_EXTENTS = 1e2
-"""Displacement over the body's extent beyond which a run has diverged."""
+DIVERGED_EXTENTS = 1e2  # displacement over the body's extent beyond which a run has diverged
 
-SWING_WINDOWS = 16
-"""Windows of a run that tell whether it swings."""
+SWING_WINDOWS = 16  # windows of a run that tell whether it swings
 
-LOOKS_PER_WINDOW = 8
-"""Looks at a window at most, since a swing may repeat itself in each."""
+LOOKS_PER_WINDOW = 8  # looks at a window at most, since a swing may repeat itself in each
 
 STEADY_SWING_RATIO = 0.8
 """Amplitude of the later half of these over that of the earlier one, above which a swing is not on its way to rest."""
 
-REST_WINDOWS = 4
-"""Windows in a row that a run has to be near rest."""
+REST_WINDOWS = 4  # windows in a row that a run has to be near rest
 
 MOST_CHANGE_RATIO = 0.99
 """Largest ratio of changes from one window to the next: slower creep counts as rest, since it may be rounding."""

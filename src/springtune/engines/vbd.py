@@ -139,8 +139,7 @@ class _Descent(Textbook):
         return _sweeps(x, y, self.inertia, self.weights, *self.groups, self.iterations)
 
 
-VERTEX_LAWS = ("area", "biquadratic")
-"""Energies besides springs."""
+VERTEX_LAWS = ("area", "biquadratic")  # energies besides springs
 
 COMMON_ATTRIBUTES: dict[str, Any] = {
     "laws": VERTEX_LAWS,

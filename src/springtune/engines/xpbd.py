@@ -17,8 +17,7 @@ from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
 from ..linalg.kernels import compiled
 from .base import EngineError, Parameter, Setting, Textbook, engine, project_springs
 
-BLOCK_KINDS = tuple(COMPLIANCE_UNITS)
-"""Kinds of blocks, by their numbers here."""
+BLOCK_KINDS = tuple(COMPLIANCE_UNITS)  # kinds of blocks, by their numbers here
 
 LEAST_AREA_RATIO = 0.05
 """Area over the one at rest below which a triangle of rubber is taken for one that has it: steps may turn it over."""

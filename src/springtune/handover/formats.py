@@ -49,8 +49,7 @@ ARRAYS = {
 }
 """Arrays of a net."""
 
-CELL_ARRAYS = {3: "triangles", 4: "quads"}
-"""Arrays that cells stand in, by their corners."""
+CELL_ARRAYS = {3: "triangles", 4: "quads"}  # arrays that cells stand in, by their corners
 
 
 def write(path: str | Path, net: Net) -> list[Path]:
@@ -128,8 +127,7 @@ def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
 # -- CSV -----------------------------------------------------------------------------------------------------------
 
 
-Heads = dict[str, Sequence[str]]
-"""Heads of the columns of arrays in a table."""
+Heads = dict[str, Sequence[str]]  # heads of the columns of arrays in a table
 
 
 def _of_arrays(*names: str) -> Heads:
@@ -217,8 +215,7 @@ def _write_json(path: Path, net: Net) -> list[Path]:
 # -- VTU -----------------------------------------------------------------------------------------------------------
 
 POINT_NAMES = {"masses": "mass", "held": "held", "forces": "load"}
-LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
-"""Names of arrays in ParaView."""
+LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}  # names of arrays in ParaView
 
 
 def write_vtu_with(
@@ -255,8 +252,7 @@ def write_vtu_with(
 NET_FORMATS = {".csv": _write_csv, ".json": _write_json, ".vtu": write_vtu_with}
 """Functions that write a net, by the ending of the name of its file."""
 
-FOR_MUJOCO = (".xml", ".mjcf")
-"""Endings of files for MuJoCo."""
+FOR_MUJOCO = (".xml", ".mjcf")  # endings of files for MuJoCo
 
 SIMULATORS: dict[str, tuple[str, Callable[[Net], str]]] = {
     **dict.fromkeys(FOR_MUJOCO, ("MuJoCo", mjcf)),

@@ -19,8 +19,7 @@ import numpy as np
 from ..safe_io import printable
 from .simulation import Net, Simulation, Terms, comment_lines, fill_template, lame, load_in_words, numbers, simulate
 
-LEAST_MASS = 1e-15
-"""Mass below which MuJoCo takes no body that moves [kg]."""
+LEAST_MASS = 1e-15  # mass below which MuJoCo takes no body that moves [kg]
 
 LARGEST_ACCELERATION = 1e9
 """Acceleration beyond which MuJoCo may take a run for a diverged one, a tenth of its limit [m/s2]."""

@@ -72,8 +72,7 @@ MATERIAL_CONSTANTS = ("name", "young_modulus", "poisson_ratio", "plane", "densit
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
 """Meaning of a largest stable step."""
 
-NOT_COMPUTED = "not computed"
-"""First words of a text in the place of a number."""
+NOT_COMPUTED = "not computed"  # first words of a text in the place of a number
 
 TOO_MANY = f"{NOT_COMPUTED}: {{}} particles, and at most {{}} are solved for a header"
 """Text in the place of expected errors on a large mesh."""

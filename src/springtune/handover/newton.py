@@ -12,8 +12,7 @@ import numpy as np
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
 from .simulation import Net, comment_lines, fill_template, lame, simulate
 
-LAWS = ("biquadratic",)
-"""Energies that triangles of Newton stand for."""
+LAWS = ("biquadratic",)  # energies that triangles of Newton stand for
 
 LAW_COMMENTS = (
     "Triangles have Newton's law: mu/2 (tr C - 2 J) + (lambda + mu)/2 (J - 1)^2, mu = tri_ke, lambda = tri_ka.",
@@ -21,8 +20,7 @@ LAW_COMMENTS = (
 )
 """Comments on that law."""
 
-EXPLICIT_STEP_ITERATIONS = 10
-"""Iterations in which VBD converges in a step that is stable in explicit schemes."""
+EXPLICIT_STEP_ITERATIONS = 10  # iterations in which VBD converges in a step that is stable in explicit schemes
 
 SLOW_PERIOD_STEPS, LONG_STEP_AND_ITERATIONS = 300, (3.0, 60)
 """Loaded period over the largest explicit step above which a step is three times that one, with more iterations.
@@ -30,8 +28,7 @@ SLOW_PERIOD_STEPS, LONG_STEP_AND_ITERATIONS = 300, (3.0, 60)
 In single precision, what is left of h^2 f / m below the last place of a position is lost in each step.
 """
 
-DECAY_TIMES = 12
-"""Times in which the slowest mode comes down to 1/e that a script runs for."""
+DECAY_TIMES = 12  # times in which the slowest mode comes down to 1/e that a script runs for
 
 
 def membrane(net: Net) -> tuple[float, float]:

@@ -9,8 +9,7 @@ import numpy as np
 from ..mesh.formats import library
 from ..safe_io import replacing, shown
 
-CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
-"""meshio's names of cells by their corners."""
+CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}  # meshio's names of cells by their corners
 
 
 def write_vtu(

@@ -179,8 +179,7 @@ ENERGY_WORDS = {
 """Words for energies besides springs, by kind."""
 
 
-STEPS_PER_PERIOD = 50
-"""Implicit steps of the slowest period that the load excites."""
+STEPS_PER_PERIOD = 50  # implicit steps of the slowest period that the load excites
 
 
 class EquilibriumWarning(UserWarning):

@@ -9,8 +9,7 @@ import numpy as np
 
 from .simulation import STEPS_PER_PERIOD, Net, comment_lines, fill_template, numbers, simulate
 
-Component = tuple[str, dict[str, str]]
-"""Name of a component, and its data."""
+Component = tuple[str, dict[str, str]]  # name of a component, and its data
 
 
 def sofa_python(net: Net) -> str:

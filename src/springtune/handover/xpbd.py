@@ -21,8 +21,7 @@ import numpy as np
 from ..mechanics.energies import area_slopes
 from .simulation import VALUES, Net, Terms, fill_template, simulate
 
-OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
-"""Units of what the terms of an energy do not have."""
+OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}  # units of what the terms of an energy do not have
 
 COMPLIANCE_UNITS = {"area": "m3/N", "biquadratic": "m3/N", "incompressible": "1/(N m)", "compressible": "1/(N m)"}
 

@@ -1,4 +1,3 @@
 """Linear algebra: sparse factorizations, their orders of elimination, and multigrid."""
 
-SOLVERS = ("Cholesky", "SuperLU", "multigrid")
-"""Names of linear solvers."""
+SOLVERS = ("Cholesky", "SuperLU", "multigrid")  # names of linear solvers

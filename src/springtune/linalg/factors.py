@@ -160,14 +160,11 @@ def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | Cho
     return factor or SuperLUFactor(matrix)
 
 
-CLEAR = 100.0
-"""Smallest ratio of an eigenvalue of T to its error for which its sign counts."""
+CLEAR = 100.0  # smallest ratio of an eigenvalue of T to its error for which its sign counts
 
-BACKWARD_ERROR = 1e-15
-"""Residual over what rounding of the solution makes of it, above which a solve is corrected."""
+BACKWARD_ERROR = 1e-15  # residual over what rounding of the solution makes of it, above which a solve is corrected
 
-PIN = 4.0
-"""Stiffness of a pin over the largest entry of the diagonal."""
+PIN = 4.0  # stiffness of a pin over the largest entry of the diagonal
 
 
 class PinnedFactor:
@@ -237,8 +234,7 @@ def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np
     return None
 
 
-LEAF = 48
-"""Particles of a part that is not cut any more."""
+LEAF = 48  # particles of a part that is not cut any more
 
 
 def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:

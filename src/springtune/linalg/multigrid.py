@@ -15,11 +15,9 @@ from . import kernels
 from .factors import Factor, SingularError
 from .kernels import Blocks, Chunks, Grid, row_pointers
 
-RESIDUAL = 1e-11
-"""Residual over the right-hand side at which a solve ends."""
+RESIDUAL = 1e-11  # residual over the right-hand side at which a solve ends
 
-STEP_RESIDUAL = 1e-6
-"""The same for a step of Newton's method."""
+STEP_RESIDUAL = 1e-6  # the same for a step of Newton's method
 
 MAX_CG_ITERATIONS = 300
 
@@ -32,23 +30,18 @@ Of two million unknowns, with shares of deviation ``n**-0.5``, one is below this
 COARSENING = 3.0
 """Spacing of the finest grid over the mesh size; of a grid of 2 the product takes longer than it saves steps."""
 
-COARSEST = 500
-"""Unknowns below which the coarsest matrix is factorized, as a dense one."""
+COARSEST = 500  # unknowns below which the coarsest matrix is factorized, as a dense one
 
-MOST_BORROWED = 50
-"""Iterations with another matrix's grids above which building own grids is faster."""
+MOST_BORROWED = 50  # iterations with another matrix's grids above which building own grids is faster
 
-IN_LINE = 1e-14
-"""Determinant of a particle's own stiffness over the product of its diagonal that counts as rounding."""
+IN_LINE = 1e-14  # determinant of a particle's own stiffness over the product of its diagonal that counts as rounding
 
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
-CHUNKS = 8
-"""Parts of the rows that threads share; fixed, so that results do not depend on the number of threads."""
+CHUNKS = 8  # parts of the rows that threads share; fixed, so that results do not depend on the number of threads
 
-ROWS_PER_CHUNK = 5_000
-"""Rows below which threads cost more than they save."""
+ROWS_PER_CHUNK = 5_000  # rows below which threads cost more than they save
 
 THREADS: int = vars(numba.config)["NUMBA_NUM_THREADS"]
 """Threads of a solve: processors of this process, or the environment variable NUMBA_NUM_THREADS."""

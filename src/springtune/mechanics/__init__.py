@@ -17,11 +17,9 @@ INTEGRATORS = (*EXPLICIT, *IMPLICIT)
 LAGGED = ("symplectic-euler", "central-difference-lagged")
 """Schemes in which all damping lags, which reduces the stable step."""
 
-PRECISIONS = ("float64", "float32")
-"""Floating-point numbers that explicit schemes compute in."""
+PRECISIONS = ("float64", "float32")  # floating-point numbers that explicit schemes compute in
 
-BEHAVIOURS = ("stable", "decaying", "growing", "nan")
-"""Meanings of the flags of ``behaviour``: how a run treats noise."""
+BEHAVIOURS = ("stable", "decaying", "growing", "nan")  # meanings of the flags of ``behaviour``: how a run treats noise
 
 
 @dataclass(frozen=True)

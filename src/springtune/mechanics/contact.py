@@ -28,43 +28,33 @@ from ..mesh.cells import Mesh
 from ..mesh.sheets import outline_of
 from .network import FollowerPressure, Network
 
-REACH_SIZES = 2.0
-"""Distance up to which corners and edges are watched, over the mesh size."""
+REACH_SIZES = 2.0  # distance up to which corners and edges are watched, over the mesh size
 
-STRAIGHT_SINE = 1e-6
-"""Sine of the angle below which two edges are taken for one line."""
+STRAIGHT_SINE = 1e-6  # sine of the angle below which two edges are taken for one line
 
 JOINT_DISTANCE = 1e-6
 """Distance from the joint of two edges at which a corner counts as being there, over the mesh size."""
 
-LONGEST_STEP = 0.5
-"""Longest way of a particle in one Newton step, over the mesh size."""
+LONGEST_STEP = 0.5  # longest way of a particle in one Newton step, over the mesh size
 
-CONTACT_TOLERANCE = 1e-9
-"""Longest last Newton step, over the mesh size: its error is of the order of its square."""
+CONTACT_TOLERANCE = 1e-9  # longest last Newton step, over the mesh size: its error is of the order of its square
 
 MAX_CONTACT_STEPS = 40
 
-SMALLEST_LOAD_STEP = 1e-4
-"""Smallest step of the load [1]."""
+SMALLEST_LOAD_STEP = 1e-4  # smallest step of the load [1]
 
 DIAGONAL_SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
 """Diagonal shifts tried in turn to make a tangent definite, over its mean diagonal."""
 
-DEPTH_TOLERANCE = 1e-9
-"""Depth of a corner behind an edge that counts as zero, over the mesh size."""
+DEPTH_TOLERANCE = 1e-9  # depth of a corner behind an edge that counts as zero, over the mesh size
 
-CONTACT_COMPLIANCE = 1e-11
-"""Compliance added at a contact, over the bodies' own [1]."""
+CONTACT_COMPLIANCE = 1e-11  # compliance added at a contact, over the bodies' own [1]
 
-MOST_EXCHANGES = 30
-"""How often a set of closed contacts is exchanged before non-negative least squares look for it."""
+MOST_EXCHANGES = 30  # how often a set of closed contacts is exchanged before non-negative least squares look for it
 
-MOST_SET_CHANGES = 4
-"""How often a Newton step may change which contacts it takes for closed."""
+MOST_SET_CHANGES = 4  # how often a Newton step may change which contacts it takes for closed
 
-FRICTION_TOLERANCE = 1e-6
-"""The tolerance in place of `CONTACT_TOLERANCE` with friction, which lags a step behind."""
+FRICTION_TOLERANCE = 1e-6  # the tolerance in place of `CONTACT_TOLERANCE` with friction, which lags a step behind
 
 FRICTION_SLIP = 1e-3
 """Slip over which friction grows to its limit, over the mesh size; what sticks creeps by about as much a load step."""

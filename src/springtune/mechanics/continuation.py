@@ -9,23 +9,18 @@ from ..linalg.factors import Factor, SingularError
 from .network import Network
 from .newton import TOLERANCE, LoadedNetwork, norm
 
-INCREMENT_BEYOND = 0.25
-"""First increment beyond the last load step, over that step."""
+INCREMENT_BEYOND = 0.25  # first increment beyond the last load step, over that step
 
-MOST_POINTS_BEYOND = 24
-"""Most points beyond the last load step in search of a limit point."""
+MOST_POINTS_BEYOND = 24  # most points beyond the last load step in search of a limit point
 
-LEAST_INCREMENT = 1e-6
-"""Shortest increment beyond the last load step, over that step."""
+LEAST_INCREMENT = 1e-6  # shortest increment beyond the last load step, over that step
 
-LEAST_INCREMENT_INVERTING = 1e-3
-"""Shortest increment to a place where a cell inverts, over that step."""
+LEAST_INCREMENT_INVERTING = 1e-3  # shortest increment to a place where a cell inverts, over that step
 
 LIMIT_LOAD_TOLERANCE = 1e-3
 """Relative distance below a limit point, which is only estimated, at which a load may lie above it."""
 
-MOST_POINTS_BEHIND = 60
-"""Most points behind a limit point in search of a stable one that carries the load."""
+MOST_POINTS_BEHIND = 60  # most points behind a limit point in search of a stable one that carries the load
 
 FEW_STEPS, MANY_STEPS, MOST_POINT_STEPS = 3, 8, 12
 """Newton steps of a point: up to which the next increment grows, beyond which it is halved, and most of them."""

@@ -37,8 +37,7 @@ from ..mesh.cells import Mesh, MeshError, rows_of, side_shares, signed_areas
 from ..mesh.sheets import connected
 from .network import Network
 
-STRIP_TOLERANCE = 1e-6
-"""Tolerance of a strip's length over its extent [1]: coordinates from files have few digits."""
+STRIP_TOLERANCE = 1e-6  # tolerance of a strip's length over its extent [1]: coordinates from files have few digits
 
 
 Elastic = Any

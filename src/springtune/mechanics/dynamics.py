@@ -24,14 +24,12 @@ from .newton import TOLERANCE
 from .statics import StaticProblem
 from .stepping import Moving, make_stepper
 
-STEPS_PER_CHECK = 64
-"""Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
+STEPS_PER_CHECK = 64  # steps between checks of an explicit run; a check costs about two steps, one for rest some twenty
 
 VECTORS_PER_LOOK, MODE_RESIDUAL = 12, 1e-9
 """Vectors of Lanczos' method between looks at its modes; how far inertia may move a mode from its shape [1]."""
 
-MOST_EXTENTS = 1e3
-"""Displacement over the largest of the network's extents beyond which a run has left its model."""
+MOST_EXTENTS = 1e3  # displacement over the largest of the network's extents beyond which a run has left its model
 
 
 def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
@@ -311,8 +309,7 @@ def _largest(matrix: sparray, start: np.ndarray | None = None) -> tuple[float, n
 
 # -- dynamic relaxation ------------------------------------------------------------------------------------------------
 
-STEPS_PER_ESTIMATE = 40
-"""Steps between new estimates of the lowest frequency."""
+STEPS_PER_ESTIMATE = 40  # steps between new estimates of the lowest frequency
 
 
 def relax(network: Network, load: np.ndarray, *, linear: bool = False, max_steps: int = 200_000) -> Run:

@@ -406,8 +406,7 @@ class StableNeoHookeEnergy(_SheetEnergy):
 LOG_LEAST_VOLUME = np.log(0.5)
 """Logarithm of the smallest volume with an equilibrium across the sheet in `NeoHookeEnergy`."""
 
-MOST_VOLUME_STEPS = 60
-"""Steps of Newton's method, or halvings, for the volume of a cell: a handful are taken."""
+MOST_VOLUME_STEPS = 60  # steps of Newton's method, or halvings, for the volume of a cell: a handful are taken
 
 
 @dataclass(frozen=True)

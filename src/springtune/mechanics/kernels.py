@@ -19,11 +19,9 @@ from numba.extending import intrinsic
 
 from ..linalg.kernels import compiled
 
-CHECKS_BEFORE_YIELD = 1000
-"""Checks of another thread, some microseconds, before a waiting thread yields its core."""
+CHECKS_BEFORE_YIELD = 1000  # checks of another thread, some microseconds, before a waiting thread yields its core
 
-PROGRESS_STRIDE = 8
-"""Array entries between progress counters of threads: a cache line, against false sharing."""
+PROGRESS_STRIDE = 8  # array entries between progress counters of threads: a cache line, against false sharing
 
 
 @contextmanager
@@ -58,11 +56,9 @@ def _acquire(context: Any, array: Any) -> Any:
     return types.int64(array), code
 
 
-_tell: Any = intrinsic(_release)
-"""Store the first number of an array after all previous writes (release)."""
+_tell: Any = intrinsic(_release)  # store the first number of an array after all previous writes (release)
 
-_told: Any = intrinsic(_acquire)
-"""Load the first number of an array before all later reads (acquire)."""
+_told: Any = intrinsic(_acquire)  # load the first number of an array before all later reads (acquire)
 
 
 @compiled

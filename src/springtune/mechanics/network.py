@@ -46,11 +46,9 @@ def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool
     return ("Cholesky" if direct else "SuperLU") if solver is None and unknowns <= most else None
 
 
-NO_STIFFNESS = 1e-12
-"""Stiffness of a spring or a motion, over the stiffest spring, that counts as zero."""
+NO_STIFFNESS = 1e-12  # stiffness of a spring or a motion, over the stiffest spring, that counts as zero
 
-SMALL_PIVOT = 1e-8
-"""Pivot over the stiffest spring below which a mechanism is looked for."""
+SMALL_PIVOT = 1e-8  # pivot over the stiffest spring below which a mechanism is looked for
 
 
 class FollowerPressure:

@@ -24,23 +24,18 @@ ERROR_TOLERANCE = 1e-6
 REFINE_FROM_ERROR = 1e-9
 """Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
 
-ROUNDING_FACTOR = 4.0
-"""Residual that counts as balance, over that of rounding the displacements."""
+ROUNDING_FACTOR = 4.0  # residual that counts as balance, over that of rounding the displacements
 
 MOST_WATCHED_STEPS = 4
 """Steps in a row that may leave the residual above its minimum: a slender turning beam stretches and releases."""
 
-LONGEST_STEP = 0.5
-"""Largest change of a spring's vector over its length in a watched step."""
+LONGEST_STEP = 0.5  # largest change of a spring's vector over its length in a watched step
 
-MOST_MODES = 24
-"""Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
+MOST_MODES = 24  # eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable
 
-FLUTTER_SHARE = 1e-6
-"""Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
+FLUTTER_SHARE = 1e-6  # imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter
 
-KEPT_TANGENT_FACTOR = 0.03
-"""Largest factor on the residual in a step for which the tangent is reused."""
+KEPT_TANGENT_FACTOR = 0.03  # largest factor on the residual in a step for which the tangent is reused
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 DISSECTION_FROM_UNKNOWNS = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
 
-PIN_COUNTS = (8, 32)
-"""Particles to pin in an indefinite matrix; the second number is tried if the first fails."""
+PIN_COUNTS = (8, 32)  # particles to pin in an indefinite matrix; the second number is tried if the first fails
 
 
 class Pattern:

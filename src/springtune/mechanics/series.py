@@ -8,38 +8,29 @@ import numpy as np
 from ..linalg.factors import Factor, SingularError
 from .statics import HIGH_ORDER, Expansion, StaticProblem
 
-CURVE_TOLERANCE = 1e-7
-"""Largest estimated relative error of a displacement on a sensitivity curve."""
+CURVE_TOLERANCE = 1e-7  # largest estimated relative error of a displacement on a sensitivity curve
 
 CHECKED_STRETCH = 0.1
 """Largest relative length change of a spring between two checked tangents; stability can vary within 0.25."""
 
-PATH_ORDER = 10
-"""Order of a series along the path."""
+PATH_ORDER = 10  # order of a series along the path
 
-MAX_SERIES = 3
-"""Most series in the load, including that about rest."""
+MAX_SERIES = 3  # most series in the load, including that about rest
 
-MAX_CORRECTIONS = 4
-"""Steps of Newton's method with one tangent that bring a prediction to an equilibrium."""
+MAX_CORRECTIONS = 4  # steps of Newton's method with one tangent that bring a prediction to an equilibrium
 
 MOST_UNKNOWNS = 4000
 """Unknowns above which each load is solved alone: samples next to buckling would take longer than all others."""
 
-MAX_STEPS = 60
-"""Steps along the path beyond the series about rest."""
+MAX_STEPS = 60  # steps along the path beyond the series about rest
 
-LIMIT_LOAD_TOLERANCE = 1e-3
-"""Share of the load by which a path may still rise to a limit point when it is abandoned."""
+LIMIT_LOAD_TOLERANCE = 1e-3  # share of the load by which a path may still rise to a limit point when it is abandoned
 
-ERROR_POWER = 8
-"""Power of the way along a series with which its error is taken to grow; that of order 10 grows faster."""
+ERROR_POWER = 8  # power of the way along a series with which its error is taken to grow; that of order 10 grows faster
 
-MAX_STEP_HALVINGS = 6
-"""Most halvings of a step whose end is not a stable equilibrium."""
+MAX_STEP_HALVINGS = 6  # most halvings of a step whose end is not a stable equilibrium
 
-FEW_FACTORIZATIONS = 5
-"""Most factorizations of a solve from a prediction; one or two suffice near the path."""
+FEW_FACTORIZATIONS = 5  # most factorizations of a solve from a prediction; one or two suffice near the path
 
 PATH_DISTANCE = 0.02
 """Distance of a spring's vector from its prediction, over its length, beyond which a solve found another path."""

@@ -22,26 +22,20 @@ from .continuation import continue_path
 from .network import Network
 from .newton import Equilibrium, LoadedNetwork, uncertainty
 
-FAR_STRETCH = 0.15
-"""Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
+FAR_STRETCH = 0.15  # stretch of a spring beyond which an equilibrium is sought along the path from rest
 
-FAR_CHANGE = 0.3
-"""Change of a spring's vector over its length above which this applies too."""
+FAR_CHANGE = 0.3  # change of a spring's vector over its length above which this applies too
 
-UNSNAPPED_CHANGE = 1e-3
-"""Change of a spring's vector over its length below which no path turns back."""
+UNSNAPPED_CHANGE = 1e-3  # change of a spring's vector over its length below which no path turns back
 
 SURPRISING_CHANGE = 0.1
 """Distance of a spring's vector from its prediction, over its length, above which a load step is halved."""
 
-SMALLEST_STEP = 1 / 64
-"""Load step in which Newton's method has to converge, over the load."""
+SMALLEST_STEP = 1 / 64  # load step in which Newton's method has to converge, over the load
 
-SHORTEST_STEP = 1 / 2048
-"""Smallest load step that distinguishes springs that turn fast from springs that snap."""
+SHORTEST_STEP = 1 / 2048  # smallest load step that distinguishes springs that turn fast from springs that snap
 
-LARGEST_BEND = 0.1
-"""Largest distance of a parabola's middle from the straight way's, over its length, to use it."""
+LARGEST_BEND = 0.1  # largest distance of a parabola's middle from the straight way's, over its length, to use it
 
 FORESEEN_SHARE, WORK_SHARE = 0.25, 0.02
 """Limits without a snap: distance from the guess over the way, and work of out-of-balance forces in its middle over the
@@ -50,18 +44,14 @@ load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05."""
 WAY_INCREMENTS = 8
 """Increments of a path behind a limit point, over the straight way from there to a stable equilibrium."""
 
-HIGH_ORDER = 16
-"""Order of a series if the default order fails."""
+HIGH_ORDER = 16  # order of a series if the default order fails
 
-START_ORDER = 3
-"""Orders of the series that starts Newton's method: together they cost half of a factorization."""
+START_ORDER = 3  # orders of the series that starts Newton's method: together they cost half of a factorization
 
 
-SERIES_ORDER = 14
-"""Default order of a series for a whole curve."""
+SERIES_ORDER = 14  # default order of a series for a whole curve
 
-STEP_TOLERANCE = 1e-3
-"""Difference of two approximants over the way from the point that ends a step along the path."""
+STEP_TOLERANCE = 1e-3  # difference of two approximants over the way from the point that ends a step along the path
 
 
 class Expansion:

@@ -18,11 +18,9 @@ from .network import Network
 LEAST_ENTRIES_A_THREAD = 5000
 """Springs, or entries of a matrix, of a thread: with fewer, threads cost more than they save."""
 
-BLOCK_ROWS = 256
-"""Rows advanced at once, so that data between the loops stay in the cache."""
+BLOCK_ROWS = 256  # rows advanced at once, so that data between the loops stay in the cache
 
-CACHE_BYTES = 2**19
-"""Bytes that a thread may expect to keep near its core."""
+CACHE_BYTES = 2**19  # bytes that a thread may expect to keep near its core
 
 MOST_PASS_STEPS = 8
 """Steps of a pass at most: with more, threads wait longer for each other at its ends, and save nothing."""

@@ -28,8 +28,7 @@ KEYWORDS_NOT_READ = {
 PLANE_ELEMENTS = re.compile(r"(?:CPS|CPEG?|S?FM3D|M3D|S|STRI|DS|DC2D|R3D|CAX(?=4P$))([34])[A-Z0-9]*")
 """Types of elements in the plane, and their number of points; meshio writes R3D3 and CAX4P."""
 
-LINE_ELEMENTS = re.compile(r"(T[23]D2|B[23][13]|DC1D2|R2D2)[A-Z]*")
-"""Types of elements with two points."""
+LINE_ELEMENTS = re.compile(r"(T[23]D2|B[23][13]|DC1D2|R2D2)[A-Z]*")  # types of elements with two points
 
 
 class _Section(NamedTuple):

@@ -14,8 +14,7 @@ from ..registry import Declaration, Registry
 SIDES = {3: ((1, 2), (2, 0), (0, 1)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
 """Corners of each side of a cell; side i of a triangle is opposite its corner i."""
 
-DIAGONALS = {3: (), 4: ((0, 2), (1, 3))}
-"""Corners that are joined across a cell."""
+DIAGONALS = {3: (), 4: ((0, 2), (1, 3))}  # corners that are joined across a cell
 
 
 def no_cells(corners: int) -> np.ndarray:
@@ -321,8 +320,7 @@ def quality(mesh: Mesh) -> dict[str, float]:
     return {"minimum_angle": float(np.degrees(smallest)), "edge_length_spread": float(lengths.std() / lengths.mean())}
 
 
-MOST_MESH_PARTICLES = 5_000_000
-"""Particles beyond which no mesh is made: its edges alone take gigabytes."""
+MOST_MESH_PARTICLES = 5_000_000  # particles beyond which no mesh is made: its edges alone take gigabytes
 
 
 LARGEST_SIZE = 1000.0

@@ -19,8 +19,7 @@ from .sides import in_words
 CORNER_COUNTS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
 """Points of cells that are read and of those that make groups, by meshio's name."""
 
-PART_NUMBERS = "part"
-"""Cell data whose whole numbers are parts of the body; 0 is the main one."""
+PART_NUMBERS = "part"  # cell data whose whole numbers are parts of the body; 0 is the main one
 
 NUMBER_KEYS = (PART_NUMBERS, "gmsh:physical", "medit:ref", "avsucd:material", "su2:tag", "ugrid:ref", "netgen:index")
 """Cell data with numbers of groups; 0 is none."""
@@ -28,8 +27,7 @@ NUMBER_KEYS = (PART_NUMBERS, "gmsh:physical", "medit:ref", "avsucd:material", "s
 MED_FAMILY_KEYS = ("cell_tags", "point_tags")
 """Data in which meshio gives families of MED, and attributes with the groups of each."""
 
-GHOST_KEYS = ("vtkGhostType", "vtkGhostLevels")
-"""Data in which what belongs to other files is not 0."""
+GHOST_KEYS = ("vtkGhostType", "vtkGhostLevels")  # data in which what belongs to other files is not 0
 
 REASONS_BY_ENDING = {
     **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), abaqus.OTHER_FILES_REASON),
@@ -38,11 +36,9 @@ REASONS_BY_ENDING = {
 }
 """Why files are refused by their ending: meshio would miss parts of them, or their groups."""
 
-HDF5_SIGNATURE = b"\x89HDF\r\n"
-"""First bytes of HDF5 files, some after a block of their own."""
+HDF5_SIGNATURE = b"\x89HDF\r\n"  # first bytes of HDF5 files, some after a block of their own
 
-MOST_FILE_BYTES = 60_000_000
-"""Bytes of the largest file that is read: formats in text take a second for some megabytes."""
+MOST_FILE_BYTES = 60_000_000  # bytes of the largest file that is read: formats in text take a second for some megabytes
 
 READ_BYTES, READ_BYTES_PER_BYTE = 5e8, 40.0
 """Memory that reading a file may take [bytes], and how often its size besides: no sound file takes as much."""
@@ -50,11 +46,9 @@ READ_BYTES, READ_BYTES_PER_BYTE = 5e8, 40.0
 READ_SECONDS, READ_SECONDS_PER_BYTE = 2.0, 3e-6
 """Seconds of the processor that it may take, and for each byte besides: some readers wait for lines for ever."""
 
-MOST_FILE_POINTS = 1_000_000
-"""Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
+MOST_FILE_POINTS = 1_000_000  # most points of a file; such a mesh is read within seconds and in less than a gigabyte
 
-MOST_MESSAGE_CHARACTERS = 120
-"""Most characters of a message of meshio that are shown."""
+MOST_MESSAGE_CHARACTERS = 120  # most characters of a message of meshio that are shown
 
 
 def library() -> Any:

@@ -81,24 +81,19 @@ def free(length: float, height: float, size: float) -> Mesh:
     return Mesh(points * (np.array([length, height]) / box), made.triangles)
 
 
-LEAST_EDGES_A_TURN = 6
-"""Fewest edges of a full turn of an arc, so that a small hole remains."""
+LEAST_EDGES_A_TURN = 6  # fewest edges of a full turn of an arc, so that a small hole remains
 
-LEAST_SIZE_SHARE = 4e-6
-"""Smallest mesh size over the extent of a shape: netgen merges points a millionth apart."""
+LEAST_SIZE_SHARE = 4e-6  # smallest mesh size over the extent of a shape: netgen merges points a millionth apart
 
-GRADING = 0.3
-"""How much longer edges get over the distance from shorter ones, at most: netgen's."""
+GRADING = 0.3  # how much longer edges get over the distance from shorter ones, at most: netgen's
 
 LINE_SIZE_SHARE = 0.6
 """Length of a line over the mesh size that netgen takes it for, at least: 1 would divide edges next to shorter ones."""
 
-MOST_ROUNDS = 20
-"""Most times that a mesh is made anew because netgen divided edges of arcs."""
+MOST_ROUNDS = 20  # most times that a mesh is made anew because netgen divided edges of arcs
 
 
-Outlined = Any
-"""A `springtune.Shape`, which is of a room above."""
+Outlined = Any  # A `springtune.Shape`, which is of a room above
 
 
 @dataclass(frozen=True)
@@ -168,8 +163,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
     return {"": size, **refined}
 
 
-Line = tuple[Point, Point, int]
-"""Start and end of a line of one edge [m], and its region."""
+Line = tuple[Point, Point, int]  # start and end of a line of one edge [m], and its region
 
 
 def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[_Stretch], list[Line], dict[Point, float]]:

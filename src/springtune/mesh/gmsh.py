@@ -10,8 +10,7 @@ import numpy as np
 from .cells import MeshError
 from .sheets import Content, places
 
-LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"
-"""Remedy for cells that are not read."""
+LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"  # remedy for cells that are not read
 
 ELEMENT_TYPES = {15: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4)}
 """Name and number of points of elements that are read, by Gmsh's number."""

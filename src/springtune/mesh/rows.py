@@ -8,8 +8,7 @@ import numpy as np
 
 from .cells import Mesh, MeshError, check_box, mesh_type, nearest_counts, nearest_whole, no_cells
 
-ROW_HEIGHT = math.sqrt(3) / 2
-"""Height of a row of equilateral triangles of unit edge."""
+ROW_HEIGHT = math.sqrt(3) / 2  # height of a row of equilateral triangles of unit edge
 
 
 @mesh_type("structured", order=10, row_height=ROW_HEIGHT)

@@ -13,8 +13,7 @@ from .sides import edge_in_words, in_words, nearer, turn, winding
 COORDINATE_TOLERANCE = 1e-6
 """Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
 
-MOST_SEARCHED_ENDS = 2000
-"""Most ends of edges checked for one that hangs on another edge."""
+MOST_SEARCHED_ENDS = 2000  # most ends of edges checked for one that hangs on another edge
 
 
 def sheet_fault(mesh: Mesh) -> str:

@@ -7,8 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-MOST_PAIRS = 4_000_000
-"""Pairs of edges that are compared at a time."""
+MOST_PAIRS = 4_000_000  # pairs of edges that are compared at a time
 
 
 def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.ndarray:
@@ -74,14 +73,11 @@ def edge_in_words(points: np.ndarray, ends: Sequence[int] | np.ndarray) -> str:
     return f"from {in_words(points[ends[0]])} to {in_words(points[ends[1]])}"
 
 
-Point = tuple[float, float]
-"""Coordinates [m]."""
+Point = tuple[float, float]  # coordinates [m]
 
-RADIUS_TOLERANCE = 1e-9
-"""Largest relative difference of two ends' distances from the centre of a circle."""
+RADIUS_TOLERANCE = 1e-9  # largest relative difference of two ends' distances from the centre of a circle
 
-LEAST_SIDE_GAP = 1e-9
-"""Smallest distance of sides over the extent of the shape; nearer ones touch."""
+LEAST_SIDE_GAP = 1e-9  # smallest distance of sides over the extent of the shape; nearer ones touch
 
 CHORD_ERROR = 1e-6
 """Largest distance of an arc from the polygon that stands for it in checks, over the extent of its round."""

@@ -24,27 +24,22 @@ from ..scene.mesh_cache import A_BEAM, MeshCache, choose, is_a
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
-USUAL_LOADS = ("traction", "bending", "shear")
-"""Loads that are predicted where none are named."""
+USUAL_LOADS = ("traction", "bending", "shear")  # loads that are predicted where none are named
 
 SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
 """Limits of a beam's sides [m] and aspect ratio: beyond them the unit is likely wrong, or bending has no reference."""
 
-MOST_CHOICES = 4
-"""Choices that are kept of all definitions, and of those of springs alone."""
+MOST_CHOICES = 4  # choices that are kept of all definitions, and of those of springs alone
 
-EQUAL_STIFFNESS = 1e-5
-"""Relative difference below which stiffnesses count as equal: five digits are shown."""
+EQUAL_STIFFNESS = 1e-5  # relative difference below which stiffnesses count as equal: five digits are shown
 
-EQUAL_FORCES = 1e-11
-"""Relative difference below which stiffness matrices count as equal, but for rounding."""
+EQUAL_FORCES = 1e-11  # relative difference below which stiffness matrices count as equal, but for rounding
 
 SEARCHED_PARTICLES, SOLVED_PARTICLES = 20_000, 100_000
 """Particles up to which meshes are searched, in some six seconds each; up to which one is solved, in a minute."""
 
 
-ROUNDING_ERROR = 1e-9
-"""Largest error by rounding [1]; references of closed form have a smaller estimate."""
+ROUNDING_ERROR = 1e-9  # largest error by rounding [1]; references of closed form have a smaller estimate
 
 _T = TypeVar("_T")
 

@@ -29,8 +29,7 @@ logger = logging.getLogger(__name__)
 FINEST_CELLS_RATIO, LEAST_FINER_MESHES = 2.0, 2
 """Cells across the finest mesh tried over those of the answer, and number of finer meshes tried, at least."""
 
-ROW_HEIGHT = math.sqrt(3) / 2
-"""Height of an equilateral triangle, over its side."""
+ROW_HEIGHT = math.sqrt(3) / 2  # height of an equilateral triangle, over its side
 
 EXTRAPOLATION_MARGIN = 1.5
 """Allowed rest of an error's way to its limit, over the rest of an error in proportion to the mesh size."""
@@ -45,14 +44,11 @@ FINER_SIZES = tuple(0.5 ** (step / 24) for step in range(1, 24))
 ALL_FINER_BELOW_CELLS = 10
 """Cells across an answer from which on only every second of these sizes is tried: errors are less irregular."""
 
-REGULAR_FROM_CELLS = 4
-"""Cells across a mesh above which errors change regularly with the mesh size."""
+REGULAR_FROM_CELLS = 4  # cells across a mesh above which errors change regularly with the mesh size
 
-ACROSS_DECIMALS = 3
-"""Decimals of the cells across a mesh between whole divisions."""
+ACROSS_DECIMALS = 3  # decimals of the cells across a mesh between whole divisions
 
-SIZE_DIGITS = 4
-"""Digits of a mesh size [mm], so that the one that is printed makes the same mesh."""
+SIZE_DIGITS = 4  # digits of a mesh size [mm], so that the one that is printed makes the same mesh
 
 
 @dataclass(frozen=True)

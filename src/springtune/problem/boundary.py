@@ -10,20 +10,16 @@ from ..mesh.sides import in_words
 from .loads import MIDDLE, LoadKind, Side
 from .shapes import LoadCase, Quantity, check_names
 
-FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
-"""Places of the profile of a pressed face, over its length [1]."""
+FACE_POSITIONS = np.linspace(0.0, 1.0, 101)  # places of the profile of a pressed face, over its length [1]
 
-POINT_TOLERANCE = 1e-9
-"""Distance from a particle below which a point is that particle, over the extent of the mesh [1]."""
+POINT_TOLERANCE = 1e-9  # distance from a particle below which a point is that particle, over the extent of the mesh [1]
 
-OUTSIDE_TOLERANCE = 0.25
-"""How far outside the nearest cell a point may lie, over its size [1], as next to an arc."""
+OUTSIDE_TOLERANCE = 0.25  # how far outside the nearest cell a point may lie, over its size [1], as next to an arc
 
 CELL_TOLERANCE = 1e-6
 """How far outside a cell a point counts as in it, over the cell's size [1]: coordinates are rounded."""
 
-MOST_NEWTON_STEPS = 50
-"""Newton steps that look for a point in a quadrilateral."""
+MOST_NEWTON_STEPS = 50  # newton steps that look for a point in a quadrilateral
 
 
 def box(mesh: Mesh, sides: Iterable[Side]) -> GroupedMesh:

@@ -8,14 +8,11 @@ from numpy.typing import ArrayLike
 
 from .quantities import Status
 
-ROOT_TOLERANCE = 1e-10
-"""Relative tolerance of a best stiffness, below that of the curve."""
+ROOT_TOLERANCE = 1e-10  # relative tolerance of a best stiffness, below that of the curve
 
-MOST_BISECTIONS = 12
-"""Bisections in search of a best stiffness where a curve ends."""
+MOST_BISECTIONS = 12  # bisections in search of a best stiffness where a curve ends
 
-Solve = Callable[[float], float]
-"""Displacement at a stiffness."""
+Solve = Callable[[float], float]  # displacement at a stiffness
 
 
 def error_text(error: float) -> str:

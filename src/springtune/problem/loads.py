@@ -30,8 +30,7 @@ from typing import Any
 from ..registry import NAME, NAME_RULE, ExtensibleMapping
 from .shapes import Beam, LoadCase, Quantity, Support, Traction
 
-MIDDLE = "middle"
-"""Name of the middle of a pressed side, as a group."""
+MIDDLE = "middle"  # name of the middle of a pressed side, as a group
 
 
 @dataclass(frozen=True, order=True)
@@ -53,8 +52,7 @@ class Side:
 
 LEFT, RIGHT, BOTTOM, TOP = Side(0, False), Side(0, True), Side(1, False), Side(1, True)
 
-BOTH = (0, 1)
-"""Directions that a clamp holds."""
+BOTH = (0, 1)  # directions that a clamp holds
 
 
 @dataclass(frozen=True)
@@ -168,8 +166,7 @@ class _Kinds(dict[str, LoadKind]):
         return {**self}[name]
 
 
-LOAD_KINDS = _Kinds({load.kind.name: load.kind for load in OWN_LOADS.values()})
-"""Kinds of load by name."""
+LOAD_KINDS = _Kinds({load.kind.name: load.kind for load in OWN_LOADS.values()})  # kinds of load by name
 
 
 def _check_load(name: str, load: Any) -> Load:

@@ -130,8 +130,7 @@ class InPlane(Material):
 RUBBER_TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
 """Tests, and the power p of the nominal stress 2 (q - q^-p) W'(I_1) of an incompressible sheet."""
 
-MOST_TERMS = 3
-"""Terms of Yeoh's law."""
+MOST_TERMS = 3  # terms of Yeoh's law
 
 
 @dataclass(frozen=True, init=False)
@@ -502,11 +501,9 @@ class AnisotropicMaterial:
         return EngineeringConstants(1 / along, float(1 / across), -coupled / along, float(1 / shear), sheared / along)
 
 
-CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")
-"""Constants of a sheet in plane stress."""
+CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")  # constants of a sheet in plane stress
 
-AnyMaterial = Material | AnisotropicMaterial
-"""Materials of a sheet."""
+AnyMaterial = Material | AnisotropicMaterial  # materials of a sheet
 
 
 class EngineeringConstants(NamedTuple):
@@ -598,25 +595,21 @@ def _read_density(material: AnyMaterial) -> None:
 LEAST_STRESS_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
 
-CHECKED_STRETCHES = 400
-"""Stretches of each test over the range of the data at which a fitted law has to be stable."""
+CHECKED_STRETCHES = 400  # stretches of each test over the range of the data at which a fitted law has to be stable
 
-FIT_DIGITS = 10
-"""Digits of what is fitted."""
+FIT_DIGITS = 10  # digits of what is fitted
 
 COLUMNS_REMEDY = (
     "give two columns, stretch or engineering strain and nominal stress, with a head such as 'stretch,nominal stress "
     "[MPa]' or 'strain [%],nominal stress [MPa]'"
 )
 
-STRETCH_RANGE, STRESS_RANGE = (0.01, 50.0), (0.1, 1e12)
-"""Stretches [1] and largest stresses [Pa] that are read."""
+STRETCH_RANGE, STRESS_RANGE = (0.01, 50.0), (0.1, 1e12)  # stretches [1] and largest stresses [Pa] that are read
 
 _HEAD = re.compile(r"(?:(?:engineering|nominal)[ _])?(stretch|strain|stress) *(?:[\[(](.{0,20})[\])])?", re.IGNORECASE)
 """Head of a column: its kind, and its unit in brackets."""
 
-_RATIOS = dict.fromkeys(("-", "1", "m/m", "mm/mm"), 1.0) | {"%": 1e-2}
-"""Size of units of stretch and strain."""
+_RATIOS = dict.fromkeys(("-", "1", "m/m", "mm/mm"), 1.0) | {"%": 1e-2}  # size of units of stretch and strain
 
 
 class TestDataError(ValueError):

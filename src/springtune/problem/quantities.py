@@ -6,8 +6,7 @@ from difflib import get_close_matches
 from enum import IntEnum
 from typing import Any
 
-Number = float | Any
-"""A number in SI units, for which a text with its unit may be given as well."""
+Number = float | Any  # A number in SI units, for which a text with its unit may be given as well
 
 
 def quantity(value: float | str, kind: str, name: str) -> float:
@@ -59,11 +58,9 @@ def _remedy(kind: str) -> str:
     return f"give {QUANTITY_DIMENSIONS[kind].words}, or a number in {QUANTITY_DIMENSIONS[kind].unit}"
 
 
-LONGEST_WORD = 100
-"""Characters of a word beyond which none is near it."""
+LONGEST_WORD = 100  # characters of a word beyond which none is near it
 
-MOST_WORDS = 50
-"""Most words that are listed."""
+MOST_WORDS = 50  # most words that are listed
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
@@ -84,8 +81,7 @@ SWEPT = {
 }
 """Description and unit of each by its name in studies and datasets."""
 
-PLANES = "stress", "strain"
-"""Plane stress and plane strain: the quantity that is zero across a sheet."""
+PLANES = "stress", "strain"  # plane stress and plane strain: the quantity that is zero across a sheet
 
 OF_BODIES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name in ("young_modulus", "poisson_ratio")}
 """Variable of a dataset that holds a parameter of beams or materials."""
@@ -93,8 +89,7 @@ OF_BODIES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name
 MOST_SCENES = 1_000_000
 """Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
 
-MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"
-"""Variable of the environment with another number."""
+MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"  # variable of the environment with another number
 
 
 def shown_order(name: str, value: float) -> float:

@@ -29,8 +29,7 @@ class AssumptionWarning(UserWarning):
     """An input violates an assumption of the model, such as a thin sheet."""
 
 
-LEAST_SIDE, MOST_SIDE = 1e-5, 100.0
-"""Longer sides of bodies [m] beyond which a unit is likely to be missing."""
+LEAST_SIDE, MOST_SIDE = 1e-5, 100.0  # longer sides of bodies [m] beyond which a unit is likely to be missing
 
 
 def warn_of_body(sides: Sequence[float], thickness: float, what: str) -> None:
@@ -115,8 +114,7 @@ def size_text(length: float, height: float) -> str:
     return f"{length / unit:.4g} x {height / unit:.4g} {name}"
 
 
-Place = tuple[Number, Number]
-"""Coordinates [m]."""
+Place = tuple[Number, Number]  # coordinates [m]
 
 SIDE_TOLERANCE = 1e-6
 """Distance from a side at which a named point is put on it, over the extent of the shape: coordinates are rounded."""

@@ -42,8 +42,7 @@ class BeamField:
 MOST_ROTATION_EFFECT = 0.01
 """Largest effect of finite rotation on a displacement, relative, with which a reference of small strain applies."""
 
-MOST_STRAIN = 0.15
-"""Largest strain for a small-strain reference; the paper's beams stretch by 5 %, its block by 11 %."""
+MOST_STRAIN = 0.15  # largest strain for a small-strain reference; the paper's beams stretch by 5 %, its block by 11 %
 
 JUDGED_AREA_SHARE = 0.95
 """Share of a body in which rotations and strains are at most those that it is judged by: corners are singular."""

@@ -17,8 +17,7 @@ from ..problem.shapes import LoadCase, Shape
 from .shapes import VOIGT, solve_shape
 from .triangles import shape_functions
 
-ENERGY_TOLERANCE = 1e-4
-"""Largest relative error estimate of the energy at which a level of finite elements is taken."""
+ENERGY_TOLERANCE = 1e-4  # largest relative error estimate of the energy at which a level of finite elements is taken
 
 ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
 """Places of the constants C11, C22, C12, C66, C16 and C26 in the stiffness of a part."""

@@ -19,11 +19,9 @@ from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law
 from .shapes import LOWEST_DEGREE, Level, Problem, ShapeReference, solve_shape
 from .triangles import inverse_of, local_functions, side_functions, tabulated
 
-TOLERANCE = 1e-3
-"""Largest accepted relative error estimate."""
+TOLERANCE = 1e-3  # largest accepted relative error estimate
 
-FULL_LEVELS = 3
-"""Levels with an equilibrium before triangles at corners may keep their degree."""
+FULL_LEVELS = 3  # levels with an equilibrium before triangles at corners may keep their degree
 
 
 def solve_finite_shape(

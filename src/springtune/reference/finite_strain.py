@@ -30,17 +30,14 @@ from ..problem.shapes import Beam
 from .answers import BeamField
 from .small_strain import ReferenceNotConvergedError
 
-ELEMENT_COUNTS = (5, 8)
-"""Elements over half the height of the two meshes that are solved; the second is the answer."""
+ELEMENT_COUNTS = (5, 8)  # elements over half the height of the two meshes that are solved; the second is the answer
 
-GRADING_POWER = 3
-"""Power law of the elements' coordinates towards the corners."""
+GRADING_POWER = 3  # power law of the elements' coordinates towards the corners
 
 TOLERANCE = 1e-6
 """Last step of Newton's method over the displacements; the error that it leaves is about its square, or rounding."""
 
-FARTHEST_STEP = 2.0
-"""Largest step of Newton's method over the size of the sheet."""
+FARTHEST_STEP = 2.0  # largest step of Newton's method over the size of the sheet
 
 MAX_ITERATIONS = 10
 
@@ -49,11 +46,9 @@ MOST_ELEMENT_RATIO = 10
 
 SMALLEST_STEP = 1 / 64
 
-PATH_TOLERANCE = 0.01
-"""Difference of two meshes' displacements within which they are on the same path."""
+PATH_TOLERANCE = 0.01  # difference of two meshes' displacements within which they are on the same path
 
-LARGEST_BEND = 0.1
-"""Largest bend of the way between two equilibria, as `springtune.mechanics.statics.LARGEST_BEND`."""
+LARGEST_BEND = 0.1  # largest bend of the way between two equilibria, as `springtune.mechanics.statics.LARGEST_BEND`
 
 
 class FiniteStrainError(ReferenceNotConvergedError):

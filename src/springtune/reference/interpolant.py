@@ -16,23 +16,18 @@ from numpy.typing import ArrayLike
 from ..problem.loads import LoadKind
 from .small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_unit
 
-TOLERANCE = 2e-5
-"""Largest relative error estimate of an interpolant by default [1], a fifth of that of a reference."""
+TOLERANCE = 2e-5  # largest relative error estimate of an interpolant by default [1], a fifth of that of a reference
 
-NODE_SHARE = 0.5
-"""Share of the tolerance that the error estimates of nodes may take."""
+NODE_SHARE = 0.5  # share of the tolerance that the error estimates of nodes may take
 
-SAFETY_FACTOR = 3.0
-"""Factor on the largest difference at the checks, since tens of checks hardly meet the maximum."""
+SAFETY_FACTOR = 3.0  # factor on the largest difference at the checks, since tens of checks hardly meet the maximum
 
 CHECKS_INSIDE, CHECKS_ON_EDGE = 12, 3
 """Points inside the box and on each edge where solves check an interpolant; corners are nodes."""
 
-CHECKS_SEED = 20
-"""Seed of the places of these points."""
+CHECKS_SEED = 20  # seed of the places of these points
 
-MOST_NODES = 65
-"""Most nodes along an axis."""
+MOST_NODES = 65  # most nodes along an axis
 
 LIMITS_TOLERANCE = 0.05
 """Largest relative difference of rotation and strain at the checks; they jump by a percent with the grid."""

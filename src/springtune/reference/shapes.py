@@ -360,8 +360,7 @@ class Problem:
         return len(self._graded.triangles) * ((degree + 1) * (degree + 2)) ** 2
 
 
-VOIGT = np.array([[0, 2], [2, 1]])
-"""Place of a pair of axes among xx, yy and xy."""
+VOIGT = np.array([[0, 2], [2, 1]])  # place of a pair of axes among xx, yy and xy
 
 
 class Level:

@@ -24,35 +24,26 @@ from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
-_Ends = tuple[int, int]
-"""Points at the ends of a side, the lower number first."""
+_Ends = tuple[int, int]  # points at the ends of a side, the lower number first
 
-LARGEST_TURN = np.pi / 6
-"""Largest change of direction along a triangle's side on an arc [rad]."""
+LARGEST_TURN = np.pi / 6  # largest change of direction along a triangle's side on an arc [rad]
 
-LARGEST_SAGITTA = 0.15
-"""Largest sagitta of a triangle's side on an arc, over the distance to the rest of the outline."""
+LARGEST_SAGITTA = 0.15  # largest sagitta of a triangle's side on an arc, over the distance to the rest of the outline
 
-PIECE_SAMPLES = 7
-"""Points on a piece of an outline at which distances are taken."""
+PIECE_SAMPLES = 7  # points on a piece of an outline at which distances are taken
 
-LENGTH_TOLERANCE = 1e-9
-"""Distance that counts as zero, over the extent of a shape."""
+LENGTH_TOLERANCE = 1e-9  # distance that counts as zero, over the extent of a shape
 
-STRAIGHT_TURN = 1e-6
-"""Turn of a polygon that counts as zero [rad]."""
+STRAIGHT_TURN = 1e-6  # turn of a polygon that counts as zero [rad]
 
 SMOOTH_TURN = np.radians(12)
 """Turn of an outline that needs no smaller triangles [rad]: a polygon that stands for a circle."""
 
-SMALL_TURN = 1e-3
-"""Turn of an outline that counts as zero for stresses [rad]."""
+SMALL_TURN = 1e-3  # turn of an outline that counts as zero for stresses [rad]
 
-UNGRADED_ANGLE = np.radians(91)
-"""Largest angle of a corner without supports and loads that needs no grading [rad]."""
+UNGRADED_ANGLE = np.radians(91)  # largest angle of a corner without supports and loads that needs no grading [rad]
 
-LEAST_SIDES_ALONG = 4
-"""Sides of triangles along the extent of a shape, at least."""
+LEAST_SIDES_ALONG = 4  # sides of triangles along the extent of a shape, at least
 
 
 SIDE_CORNERS = ((0, 1), (1, 2), (0, 2))

@@ -29,12 +29,10 @@ if TYPE_CHECKING:
 
     AnyReference = ReferenceSolution | FiniteStrainSolution | ShapeReference
 
-A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
-"""Call that makes a mesh with groups, for messages."""
+A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"  # call that makes a mesh with groups, for messages
 
 
-MOST_GAP = 1e-6
-"""Largest gap between a mesh and its beam, over the beam's extent."""
+MOST_GAP = 1e-6  # largest gap between a mesh and its beam, over the beam's extent
 
 
 MOST_DISTANCE_FROM_SIDE = 1e-5

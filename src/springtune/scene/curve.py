@@ -26,8 +26,7 @@ USUAL_RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 """Stiffnesses of a curve over E t [1], where none are given."""
 
 
-LEAST_RATIO = 1e-9
-"""Least ratio of a stiffness; the largest is one over it [1]."""
+LEAST_RATIO = 1e-9  # least ratio of a stiffness; the largest is one over it [1]
 
 
 def follow(sheet: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:

@@ -41,36 +41,27 @@ REMEDIES |= dict.fromkeys(USUAL_POISSON_RATIOS, "add a transverse displacement o
 LEAST_DERIVATIVE = 1e-7
 """Derivative by a constant besides those by others, over the largest, below which tests do not tell the constant."""
 
-POISSON_STEP = 0.1
-"""Change of a Poisson's ratio that is as likely as one of a modulus by a factor e."""
+POISSON_STEP = 0.1  # change of a Poisson's ratio that is as likely as one of a modulus by a factor e
 
-POOR_HALF_INTERVAL = 0.5
-"""Half of an interval from which on a constant is poorly determined: of a ratio, or relative."""
+POOR_HALF_INTERVAL = 0.5  # half of an interval from which on a constant is poorly determined: of a ratio, or relative
 
-MISFIT_PROBABILITY = 0.01
-"""Probability of residuals by chance below which a law misfits."""
+MISFIT_PROBABILITY = 0.01  # probability of residuals by chance below which a law misfits
 
 EXPLAINED_SHARE = 0.5
 """Share of a field's squares below which, with residuals that are not random, it is not of its load."""
 
-REFERENCE_ERROR = 3e-4
-"""Error of the reference over the values' root mean square, below which residuals tell nothing."""
+REFERENCE_ERROR = 3e-4  # error of the reference over the values' root mean square, below which residuals tell nothing
 
-LEAST_NOISE = 1e-9
-"""Noise over the values' root mean square that is rounding."""
+LEAST_NOISE = 1e-9  # noise over the values' root mean square that is rounding
 
 
-OUTLIER_DEVIATIONS = 5.0
-"""Deviations from which on a value is no measurement; more of few values."""
+OUTLIER_DEVIATIONS = 5.0  # deviations from which on a value is no measurement; more of few values
 
-FEWEST_POINTS = 10
-"""Places from which on their residuals are looked at."""
+FEWEST_POINTS = 10  # places from which on their residuals are looked at
 
-DEVIATION_OVER_MEDIAN = 1.4826
-"""Standard deviation over the median of magnitudes."""
+DEVIATION_OVER_MEDIAN = 1.4826  # standard deviation over the median of magnitudes
 
-CORRELATION_DEVIATIONS = 2.75
-"""Deviations of the correlation of neighbours from which on it is no chance."""
+CORRELATION_DEVIATIONS = 2.75  # deviations of the correlation of neighbours from which on it is no chance
 
 
 def vary(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:

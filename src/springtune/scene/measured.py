@@ -26,11 +26,9 @@ HEADS = "give columns such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u 
 GAUGES = ("gauge-1", "gauge-2")
 """Points of a beam between which ``transverse`` is measured: the middles of the sides beside the load."""
 
-LARGEST_MEASUREMENT = 1e30
-"""Number beyond which a cell has no measurement, but the largest number of a program."""
+LARGEST_MEASUREMENT = 1e30  # number beyond which a cell has no measurement, but the largest number of a program
 
-MOST_DISTANCE_FROM_BODY = 1e-3
-"""Distance from the body, over its extent, up to which a point counts as on its outline."""
+MOST_DISTANCE_FROM_BODY = 1e-3  # distance from the body, over its extent, up to which a point counts as on its outline
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,7 @@ from ..problem.shapes import Beam
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
-NETWORKS_KEPT = 6
-"""Factorized networks of a mesh that are kept; few are enough for scenes in order."""
+NETWORKS_KEPT = 6  # factorized networks of a mesh that are kept; few are enough for scenes in order
 
 
 A_BEAM, A_SHAPE = "springtune.Beam('200 mm', '40 mm')", "springtune.Shape.rectangle('200 mm', '40 mm')"
@@ -123,8 +122,7 @@ def solve_and_judge(
     return Solution(problem, found, status, message, pivots, value)
 
 
-KnownNetwork = tuple[Network, dict[tuple[object, ...], StaticProblem]]
-"""Network, and its problems so far."""
+KnownNetwork = tuple[Network, dict[tuple[object, ...], StaticProblem]]  # network, and its problems so far
 
 
 class MeshCache:

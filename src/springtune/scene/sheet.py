@@ -17,8 +17,7 @@ from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
 from .mesh_cache import A_MATERIAL, A_MESH, AnyDefinition, MeshCache, choose, definition_of, is_a, naming_errors
 
-START_DEFINITIONS = ("van-gelder", "lattice", "energy-fit")
-"""Definitions from whose springs searches start."""
+START_DEFINITIONS = ("van-gelder", "lattice", "energy-fit")  # definitions from whose springs searches start
 
 
 @dataclass(frozen=True)

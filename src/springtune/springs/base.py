@@ -199,8 +199,7 @@ class Definition(Declaration):
         return found
 
 
-NEEDS = ("", "stiffness", "cases")
-"""Possible fourth arguments of a definition."""
+NEEDS = ("", "stiffness", "cases")  # possible fourth arguments of a definition
 
 Function = TypeVar("Function", bound=Callable[..., Springs])
 
@@ -298,8 +297,7 @@ def from_rectangles(mesh: Mesh, first: np.ndarray, second: np.ndarray, diagonal:
     return mesh.sum_to_edges({4: np.stack([first, second, first, second, diagonal, diagonal], axis=1)})
 
 
-NO_STIFFNESS = 1e-12
-"""Stiffness over E t that counts as zero: of terms that cancel rounding decides the sign."""
+NO_STIFFNESS = 1e-12  # stiffness over E t that counts as zero: of terms that cancel rounding decides the sign
 
 
 def _held_together(mesh: Mesh, stiffness: np.ndarray) -> None:

@@ -40,20 +40,16 @@ from .patch_fit import NU, polynomial_tests
 STRETCH_WEIGHT, DISPLACEMENT_WEIGHT, START_WEIGHT = 0.1, 0.1, 1e-3
 """Weights w_s, w_u and lambda against the squared misfit of the energies [1]."""
 
-EVALUATIONS = 400
-"""Networks that a search tries, each with a gradient."""
+EVALUATIONS = 400  # networks that a search tries, each with a gradient
 
-LEAST_START = 0.01
-"""Least stiffness from which a search starts, over the mean [1]: logarithms need one above zero."""
+LEAST_START = 0.01  # least stiffness from which a search starts, over the mean [1]: logarithms need one above zero
 
 LEAST_DISPLACEMENT = 0.01
 """Displacement over the largest load's below which it counts no less, as in slender sheets [1]."""
 
-LEAST_MOVE = 1e-4
-"""Virtual stretch below which a spring's proves little [1]."""
+LEAST_MOVE = 1e-4  # virtual stretch below which a spring's proves little [1]
 
-ROUNDING = 1e-9
-"""By which a bound is lowered, and below which numbers are zero [1]."""
+ROUNDING = 1e-9  # by which a bound is lowered, and below which numbers are zero [1]
 
 
 @definition("best-springs", order=197, cells=(3,), cost=2)

@@ -19,8 +19,7 @@ from ..problem.materials import AnyMaterial, Material
 from . import energy_fit, lattice
 from .base import DefinitionError, Springs, membrane_stiffness
 
-SPAN = 10.0
-"""Largest factor between a spring and where its search starts [1]."""
+SPAN = 10.0  # largest factor between a spring and where its search starts [1]
 
 
 @dataclass(frozen=True, eq=False)

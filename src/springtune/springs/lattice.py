@@ -23,8 +23,7 @@ from ..problem.materials import Material
 from ..problem.shapes import Beam
 from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
 
-COEFFICIENT = math.sqrt(3) / 2
-"""Stiffness of an edge inside over E t [1]."""
+COEFFICIENT = math.sqrt(3) / 2  # stiffness of an edge inside over E t [1]
 
 
 @definition("lattice", order=60)

@@ -17,8 +17,7 @@ from ..problem.materials import Material
 from . import lattice
 from .base import DefinitionError, Springs, definition, from_rectangles, rectangles_only
 
-SIDE, DIAGONAL = 5 / 16, 7 / 16
-"""Stiffness that a square gives its sides and diagonals over E t [1]."""
+SIDE, DIAGONAL = 5 / 16, 7 / 16  # stiffness that a square gives its sides and diagonals over E t [1]
 
 
 @definition("lloyd", order=70)

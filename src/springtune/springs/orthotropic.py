@@ -28,8 +28,7 @@ from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, rotated
 from .base import DefinitionError, Springs, definition, from_rectangles, membrane_stiffness, rectangles_only
 
-COUPLING = 1e-9
-"""Largest C16 and C26 along the sides of a rectangle, over the largest constant, that are rounding [1]."""
+COUPLING = 1e-9  # largest C16 and C26 along the sides of a rectangle, over the largest constant, that are rounding [1]
 
 
 @definition("orthotropic", order=215, cells=(4,), anisotropic=True)

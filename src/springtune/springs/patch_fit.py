@@ -41,17 +41,13 @@ from . import van_gelder
 from .base import Springs, definition, triangles_only
 from .identification import tested_body
 
-NU = 1 / 3
-"""Poisson's ratio of springs alone [1]."""
+NU = 1 / 3  # poisson's ratio of springs alone [1]
 
-TEST_DEGREE = 4
-"""Degree of the displacements of the tests, one above that of the stresses."""
+TEST_DEGREE = 4  # degree of the displacements of the tests, one above that of the stresses
 
-TESTS = 4 * TEST_DEGREE - 1
-"""Polynomial solutions up to that degree that are no rigid motion."""
+TESTS = 4 * TEST_DEGREE - 1  # polynomial solutions up to that degree that are no rigid motion
 
-LEAST_TOLD = 1e-12
-"""Energy of a test over the largest one's below which it is rounding, as in very slender sheets [1]."""
+LEAST_TOLD = 1e-12  # energy of a test over the largest one's below which it is rounding, as in very slender sheets [1]
 
 CHANGE_WEIGHT = 0.1
 """lambda: weight of the mean squared logarithm of a spring's change against the squared misfit of the tests [1]."""

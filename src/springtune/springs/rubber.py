@@ -16,8 +16,7 @@ from ..problem.materials import CHECKED_STRETCHES, TensileTest, TestDataError, c
 LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""
 
-FLAT = 2.0
-"""Stretch at which a lattice of equilateral triangles, pulled along a row, lies flat."""
+FLAT = 2.0  # stretch at which a lattice of equilateral triangles, pulled along a row, lies flat
 
 
 @dataclass(frozen=True)

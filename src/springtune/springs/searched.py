@@ -20,14 +20,11 @@ from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .identification import Case, Misfit, patch_cases
 
-MAX_EVALUATIONS = 1000
-"""Networks that a random search tries."""
+MAX_EVALUATIONS = 1000  # networks that a random search tries
 
-POPULATION = 20
-"""Networks of a generation of `evolved`."""
+POPULATION = 20  # networks of a generation of `evolved`
 
-MAX_GRADIENTS = 400
-"""Networks that `adjoint` tries, each with the gradient of its misfit."""
+MAX_GRADIENTS = 400  # networks that `adjoint` tries, each with the gradient of its misfit
 
 
 @definition("annealed", order=150, needs="cases", anisotropic=True, cost=2)

@@ -18,16 +18,14 @@ from .messages import Key, Problems, part_of, show
 from .model import Grid
 from .sections import SAME_VALUE, StatedStiffness, StudyConfig, factors
 
-Place = Sequence[Key]
-"""Path in a study."""
+Place = Sequence[Key]  # path in a study
 
 Names = Iterable[str]
 
 PLAUSIBLE_FACTOR = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness is an error of units, as the paper's 170E6 N/mm."""
 
-MOST_CELLS = 2_500_000
-"""Limit of label combinations over all dimensions, requested or not."""
+MOST_CELLS = 2_500_000  # limit of label combinations over all dimensions, requested or not
 
 MOST_CURVE_POINTS = 10_000_000
 

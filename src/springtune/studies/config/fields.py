@@ -36,14 +36,11 @@ MOST_POINTS = 10_001
 
 MOST_LISTED = 10_000
 
-LARGEST_QUANTITY = 1e30
-"""Size of a quantity of either sign from which nothing can be computed with it [SI units]."""
+LARGEST_QUANTITY = 1e30  # size of a quantity of either sign from which nothing can be computed with it [SI units]
 
-FEW_NAMES = 5
-"""Most names that a message lists."""
+FEW_NAMES = 5  # most names that a message lists
 
-Notes = tuple[Any, ...]
-"""Notes of an `Annotated`."""
+Notes = tuple[Any, ...]  # notes of an `Annotated`
 
 
 class Section(BaseModel):
@@ -119,8 +116,7 @@ def declared(what: str, *sections: str, beside: Collection[str] = ()) -> AfterVa
     return AfterValidator(known)
 
 
-FILES = "files that a study names"
-"""Key of their list in the context of validation."""
+FILES = "files that a study names"  # key of their list in the context of validation
 
 
 def _note_file(name: str, info: ValidationInfo) -> str:
@@ -196,8 +192,7 @@ class Range(Section):
 
 RANGE_KEYS = frozenset(field.alias or name for name, field in Range.model_fields.items())
 
-RANGE_DIGITS = 12
-"""Significant digits of the inner values of a range, so that 1.5 mm is 1.5e-3 m."""
+RANGE_DIGITS = 12  # significant digits of the inner values of a range, so that 1.5 mm is 1.5e-3 m
 
 
 def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:

@@ -16,13 +16,11 @@ from springtune.safe_io import UNSEEN, BeyondSize, clipped, read, shown
 
 Model = TypeVar("Model", bound=BaseModel)
 
-Key = str | int
-"""Step of a path into a file: a key or a list index."""
+Key = str | int  # step of a path into a file: a key or a list index
 
 Lines = Mapping[tuple[Key, ...], int]
 
-SHOWN_PROBLEMS = 5
-"""Problems that one message lists; the rest are counted."""
+SHOWN_PROBLEMS = 5  # problems that one message lists; the rest are counted
 
 
 class StudyError(ValueError):
@@ -241,8 +239,7 @@ def control_character_fault(text: str) -> str:
 
 LARGEST_STUDY = 500_000
 
-MOST_VALUES = 100_000
-"""Limit of values and keys, with aliases expanded."""
+MOST_VALUES = 100_000  # limit of values and keys, with aliases expanded
 
 
 def read_study(path: str | Path) -> tuple[str, Any, Lines]:

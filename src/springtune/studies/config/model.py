@@ -28,14 +28,12 @@ FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 STRAINED_REFERENCE = "neo-hooke-plane-strain"
 """Reference in plane strain; also for materials in plane stress, to compare."""
 
-TESTED_REFERENCE = "yeoh-plane-stress"
-"""The same for materials with a uniaxial test, using the fitted law."""
+TESTED_REFERENCE = "yeoh-plane-stress"  # the same for materials with a uniaxial test, using the fitted law
 
 FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE)
 
 
-Labels = dict[str, str | float]
-"""Label of a cell of the dataset, by dimension."""
+Labels = dict[str, str | float]  # label of a cell of the dataset, by dimension
 
 
 @dataclass(frozen=True)
@@ -219,8 +217,7 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
     return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
-cache_by_study = lru_cache(maxsize=8)
-"""Decorator of a function of a study whose last answers are kept."""
+cache_by_study = lru_cache(maxsize=8)  # decorator of a function of a study whose last answers are kept
 
 
 def keeps_fields(study: Study) -> bool:
@@ -254,11 +251,9 @@ _FIRST = ("bodies", "moduli", "laying", "stability", "benchmark", "samples")
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
 
-VIEWS = "views.yaml"
-"""File of a study kind with its views on the page to browse."""
+VIEWS = "views.yaml"  # file of a study kind with its views on the page to browse
 
-FORMATS = ("png", "pdf")
-"""Endings of a figure's files."""
+FORMATS = ("png", "pdf")  # endings of a figure's files
 
 Variables = dict[str, tuple[tuple[str, ...], str, str, Any]]
 """Dimensions, units, long name and value of an empty cell, by name."""

@@ -341,8 +341,7 @@ GRID_PARAMETERS = tuple(name for name in GridConfig.model_fields if name not in 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
 """Names of zipped parameters, and one tuple of values for each combination."""
 
-SAME_VALUE = 1e-9
-"""Relative difference below which two numbers are the same value."""
+SAME_VALUE = 1e-9  # relative difference below which two numbers are the same value
 
 
 def factors(grid: GridConfig) -> list[Factor]:

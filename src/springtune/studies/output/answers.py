@@ -13,11 +13,9 @@ from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_R
 if TYPE_CHECKING:
     import xarray as xr
 
-Variables = Mapping[str, tuple[Sequence[str], np.ndarray]]
-"""Dimensions and values of a group's variables and labels."""
+Variables = Mapping[str, tuple[Sequence[str], np.ndarray]]  # dimensions and values of a group's variables and labels
 
-Columns = dict[str, np.ndarray]
-"""Labels and values of cells, arrays of one dimension."""
+Columns = dict[str, np.ndarray]  # labels and values of cells, arrays of one dimension
 
 
 def variables(data: "xr.Dataset") -> Variables:
@@ -153,8 +151,7 @@ ERROR_COLOURS = (
 )  # fmt: skip
 """Colours of the size of an error, from small to large, on a logarithmic scale: ColorBrewer's YlOrBr."""
 
-ERROR_RANGE = (0.1, 100.0)
-"""Sizes of errors at the ends of the scale [%]."""
+ERROR_RANGE = (0.1, 100.0)  # sizes of errors at the ends of the scale [%]
 
 
 def sign_of_displacements(references: np.ndarray, axes: Mapping[str, Sequence[object]]) -> str:

@@ -36,8 +36,7 @@ from .text import label_text, range_text
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
 
-BOKEH_SCRIPTS = ("bokeh", "bokeh-api")
-"""Scripts of BokehJS that the page needs."""
+BOKEH_SCRIPTS = ("bokeh", "bokeh-api")  # scripts of BokehJS that the page needs
 
 
 @dataclass(frozen=True)
@@ -132,17 +131,14 @@ def _hash(script: str) -> str:
 
 # -- packed numbers ----------------------------------------------------------------------------------------------------
 
-LONG_DIMENSION = 16
-"""Fewest labels of a last dimension that counts as points along a line."""
+LONG_DIMENSION = 16  # fewest labels of a last dimension that counts as points along a line
 
 CELL_BITS_CLEARED, LINE_BITS_CLEARED = 6, 9
 """Cleared bits of 23: 5 digits of a number are left, and 4 of a point on a line, finer than a pixel."""
 
-EMPTY_TEXT = -1
-"""Number of an empty text."""
+EMPTY_TEXT = -1  # number of an empty text
 
-MOST_CHARACTERS = 4_200_000
-"""Most characters of all numbers: the page with its library stays below 5 MB."""
+MOST_CHARACTERS = 4_200_000  # most characters of all numbers: the page with its library stays below 5 MB
 
 
 def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
@@ -222,8 +218,7 @@ def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
 
 # -- errors ------------------------------------------------------------------------------------------------------------
 
-ERROR = re.compile(r"(^|_)errors?(?!_rate|_estimate)(_|$)")
-"""Names of errors; rates and estimates have no sign."""
+ERROR = re.compile(r"(^|_)errors?(?!_rate|_estimate)(_|$)")  # names of errors; rates and estimates have no sign
 
 REFERENCES = {
     "face_error": "reference_face_displacement",
@@ -325,8 +320,7 @@ def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[
 
 # -- the overview that a page opens on, without a script ---------------------------------------------------------------
 
-Content = dict[str, Any]
-"""Values that a template shows."""
+Content = dict[str, Any]  # values that a template shows
 
 
 class Source(NamedTuple):
@@ -345,26 +339,19 @@ SOURCES = (
     Source("/samples", "samples", "deformation_error", "", "load"),
 )
 
-GROUPS = {*(source.group for source in SOURCES), "/finite_strain", "/sensitivity"}
-"""Groups that the overview reads."""
+GROUPS = {*(source.group for source in SOURCES), "/finite_strain", "/sensitivity"}  # groups that the overview reads
 
-REMARK = "paper_remark"
-"""Variable that says where the print contradicts itself."""
+REMARK = "paper_remark"  # variable that says where the print contradicts itself
 
-LOOKS = 8
-"""Different colours of lines and dots."""
+LOOKS = 8  # different colours of lines and dots
 
-SMALLEST_PERCENT = 1e-4
-"""Smaller errors stand at the end of their axis."""
+SMALLEST_PERCENT = 1e-4  # smaller errors stand at the end of their axis
 
-SHORTEST_TIME = 1e-6
-"""Shorter times [s] stand at the end of their axis."""
+SHORTEST_TIME = 1e-6  # shorter times [s] stand at the end of their axis
 
-LARGEST_CURVE_PERCENT = 60.0
-"""Largest error of a sensitivity curve."""
+LARGEST_CURVE_PERCENT = 60.0  # largest error of a sensitivity curve
 
-PANEL_LABELS = ("mesh_type", "material", "load", "kinematics")
-"""Labels of a chart of sensitivity curves."""
+PANEL_LABELS = ("mesh_type", "material", "load", "kinematics")  # labels of a chart of sensitivity curves
 
 MOST_PANELS, MOST_LINES, MOST_ANSWERS = 12, 12, 24
 """Most charts of sensitivity curves and tables, curves in each chart, and rows on what to type."""

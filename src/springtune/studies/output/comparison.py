@@ -14,8 +14,7 @@ from springtune.problem.quantities import nearest
 from .dataset import NOT_REQUESTED, as_words, flag_words, is_flagged
 from .text import NUMBER, from_json, without_numbers
 
-RELATIVE_TOLERANCE = 1e-6
-"""Default relative tolerance."""
+RELATIVE_TOLERANCE = 1e-6  # default relative tolerance
 
 MEASURED_VARIABLES = ("seconds", "*_seconds", "seconds_*", "solver", "spring_updates")
 """Variables that depend on the machine."""
@@ -27,8 +26,7 @@ HIDDEN_ATTRIBUTES = {"created", "history", "config", "config_sha256", "software"
 Labels = dict[str, str | float]
 
 Pair = Sequence[xr.Dataset]
-Arrays = Sequence[xr.DataArray]
-"""Before and after."""
+Arrays = Sequence[xr.DataArray]  # before and after
 
 
 @dataclass(frozen=True)

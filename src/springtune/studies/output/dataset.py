@@ -25,14 +25,11 @@ from springtune.safe_io import replacing
 from ..config.model import EMPTY_VALUES, STRAINED_REFERENCE
 from .answers import own_law, own_laws, sign_of_displacements, variables
 
-STATUS = tuple(map(str, Status))
-"""Meanings of `status` flags in order of value."""
+STATUS = tuple(map(str, Status))  # meanings of `status` flags in order of value
 
-Label = str | float
-"""Label along a dimension: a text or a number in SI units."""
+Label = str | float  # label along a dimension: a text or a number in SI units
 
-Axes = Mapping[str, Sequence[Label]]
-"""Labels by dimension."""
+Axes = Mapping[str, Sequence[Label]]  # labels by dimension
 
 DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "beam": "beam, length x height in mm",
@@ -130,8 +127,7 @@ def most_requested(root: xr.Dataset, dimension: str) -> str:
 
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
-NO_NODE = EMPTY_VALUES["no node"]
-"""Fill value of UGRID connectivities."""
+NO_NODE = EMPTY_VALUES["no node"]  # fill value of UGRID connectivities
 
 UGRID: dict[str, dict[str, object]] = {
     "mesh": {
@@ -153,18 +149,14 @@ PARTICLE_ATTRIBUTES: dict[str, object] = {"mesh": "mesh", "location": "node"}
 SPRING_ATTRIBUTES: dict[str, object] = {"mesh": "mesh", "location": "edge"}
 """Attributes of variables of particles or springs."""
 
-CHUNK_BYTES = 2**18
-"""Most bytes of a compressed chunk, which is read for each of its cells."""
+CHUNK_BYTES = 2**18  # most bytes of a compressed chunk, which is read for each of its cells
 
-UNCOMPRESSED_BYTES = 2**13
-"""Most bytes of an uncompressed array; compressing less costs more than it saves."""
+UNCOMPRESSED_BYTES = 2**13  # most bytes of an uncompressed array; compressing less costs more than it saves
 
 
-MOSTLY_EMPTY_SHARE = 0.75
-"""Share of empty cells above which a large array of texts stores none of them."""
+MOSTLY_EMPTY_SHARE = 0.75  # share of empty cells above which a large array of texts stores none of them
 
-TEXTS_IN_CHUNK = 128
-"""Cells in a chunk of such an array."""
+TEXTS_IN_CHUNK = 128  # cells in a chunk of such an array
 
 
 def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
@@ -229,8 +221,7 @@ def _chunk_shape(shape: Sequence[int], cells: int) -> tuple[int, ...]:
     return tuple(chunk)
 
 
-LARGE_ARRAY_BYTES = 2**20
-"""Larger arrays, in bytes, are read on demand."""
+LARGE_ARRAY_BYTES = 2**20  # larger arrays, in bytes, are read on demand
 
 
 def tree(file: h5netcdf.File) -> xr.DataTree:
@@ -337,8 +328,7 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
     return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
 
 
-SHOWN_PREFIX = "shown_"
-"""Prefix of variables that hold the swept values of stored fields."""
+SHOWN_PREFIX = "shown_"  # prefix of variables that hold the swept values of stored fields
 
 
 def unswept(root: xr.Dataset) -> xr.Dataset:
@@ -397,8 +387,7 @@ def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> li
     return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
 
-Scaled = Mapping[str, tuple[str, float]]
-"""Variable and factor by the column of a table."""
+Scaled = Mapping[str, tuple[str, float]]  # variable and factor by the column of a table
 
 
 def table_rows(

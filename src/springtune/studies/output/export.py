@@ -22,8 +22,7 @@ from .text import cell_text
 
 TABLE_ENDINGS = (".csv", ".parquet")
 
-MOST_NUMBERS = 50_000_000
-"""Most rows times columns: a table repeats the labels of all dimensions in each row."""
+MOST_NUMBERS = 50_000_000  # most rows times columns: a table repeats the labels of all dimensions in each row
 
 
 def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:

@@ -53,8 +53,7 @@ def _draw(output: Output, tree: xr.DataTree, folder: Path) -> None:
 
 # -- the page of all tables --------------------------------------------------------------------------------------------
 
-MOST_ROWS = 1000
-"""Most rows on the page; CSV files have all."""
+MOST_ROWS = 1000  # most rows on the page; CSV files have all
 
 COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa", "ms": "ms"}
 

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
 
-OPENING_BYTES = 1e9
-"""Limit of bytes that opening takes."""
+OPENING_BYTES = 1e9  # limit of bytes that opening takes
 
 REASON_CHARACTERS = 200
 

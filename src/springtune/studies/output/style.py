@@ -32,30 +32,25 @@ if TYPE_CHECKING:
     from springtune.mesh.cells import Mesh
     from springtune.scene.curve import Curve
 
-Canvas = Figure | SubFigure | Axes | np.ndarray | None
-"""Where a plot is drawn: a new figure if None."""
+Canvas = Figure | SubFigure | Axes | np.ndarray | None  # where a plot is drawn: a new figure if None
 
 P = ParamSpec("P")
 Drawn = TypeVar("Drawn")
 
-COLUMN_WIDTH = 3.5
-"""Width of a column of a journal with two [inch]."""
+COLUMN_WIDTH = 3.5  # width of a column of a journal with two [inch]
 
-PAGE_WIDTH = 7.16
-"""Width of its page [inch]."""
+PAGE_WIDTH = 7.16  # width of its page [inch]
 
 METRES_PER_INCH = 0.0254
 
-POINTS_PER_INCH = 72
-"""Points in an inch, the units of a PDF page."""
+POINTS_PER_INCH = 72  # points in an inch, the units of a PDF page
 
 SETTINGS: dict[Any, Any] = dict(
     matplotlib.rc_params_from_file(Path(__file__).with_suffix(".mplstyle"), use_default_template=False)
 )
 """Settings of matplotlib."""
 
-PIXELS_PER_INCH = SETTINGS["savefig.dpi"]
-"""Pixels in an inch of a PNG file."""
+PIXELS_PER_INCH = SETTINGS["savefig.dpi"]  # pixels in an inch of a PNG file
 
 SMALL_TEXT = SETTINGS["legend.fontsize"]
 """Size of the smallest text of a figure [pt], which journals still take at these widths."""
@@ -191,14 +186,12 @@ def png_and_pdf(figure: Figure) -> dict[str, bytes]:
 
 # -- texts: constrained layout makes room for them ---------------------------------------------------------------------
 
-CHARACTER_WIDTH = 0.54
-"""Mean width of a character over its size."""
+CHARACTER_WIDTH = 0.54  # mean width of a character over its size
 
 SPACE_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:m|mm|N|kN|Pa|kPa|MPa|GPa|N/m|%)(?:\W|$))")
 """Space at which a text is not wrapped."""
 
-WIDEST_NAME_SHARE = 0.55
-"""Largest width of a line's name over that of a panel before its layout."""
+WIDEST_NAME_SHARE = 0.55  # largest width of a line's name over that of a panel before its layout
 
 POWERS_OF_TEN = {0: "", 3: "10³ ", 6: "10⁶ ", 9: "10⁹ "}
 
@@ -354,14 +347,12 @@ def small_multiples(
 
 # -- plots of a single scene and of a single curve ---------------------------------------------------------------------
 
-LARGEST_ERROR_SHOWN = 100.0
-"""Largest error of a curve in a plot [%]."""
+LARGEST_ERROR_SHOWN = 100.0  # largest error of a curve in a plot [%]
 
 BEYOND_SMALL_STRAIN = "beyond small strain"
 """Note of a figure on errors whose reference does not apply, `reference_applies` false."""
 
-NO_RESULT, NOT_ASKED = "×", "–"
-"""Cells of a heat map without an error."""
+NO_RESULT, NOT_ASKED = "×", "–"  # cells of a heat map without an error
 
 
 @styled
@@ -463,8 +454,7 @@ def magnification(fields: "xr.Dataset") -> float:
     return float(steps[steps <= factor * (1 + 1e-9)][-1])
 
 
-NETWORK_LINE_WIDTH = 0.35
-"""Width of the lines of springs that have one colour [pt]."""
+NETWORK_LINE_WIDTH = 0.35  # width of the lines of springs that have one colour [pt]
 
 
 def draw_network(

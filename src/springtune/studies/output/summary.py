@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 
     from ..config.model import Study
 
-CELLS_NAMED = 3
-"""Cells named for each status; more if fewer than two would remain."""
+CELLS_NAMED = 3  # cells named for each status; more if fewer than two would remain
 
-DEFINITIONS_LISTED = 8
-"""Most definitions with a worst error."""
+DEFINITIONS_LISTED = 8  # most definitions with a worst error
 
 COMPARED = {"/": ("deformation_error", "reference_displacement"), "/shapes": ("error", "reference_value")}
 """Error and reference of groups whose definitions are compared."""

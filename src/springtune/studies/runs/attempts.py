@@ -34,11 +34,9 @@ from springtune.registry import import_name
 from . import store
 from .store import DamagedError
 
-MODULE = "studies.runs.attempts"
-"""This module; the keys of all results depend on it."""
+MODULE = "studies.runs.attempts"  # this module; the keys of all results depend on it
 
-TRACEBACKS = 3
-"""Most tracebacks in the log of a job; similar tasks fail alike."""
+TRACEBACKS = 3  # most tracebacks in the log of a job; similar tasks fail alike
 
 LONGEST_KEY = 4096
 

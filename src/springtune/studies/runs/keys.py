@@ -293,8 +293,7 @@ def material_key(material: Material, density: bool = False) -> dict[str, Any]:
 SOFTWARE = ("cvxopt h5netcdf h5py meshio netgen-mesher numba numpy scikit-fem scipy snakemake xarray").split()
 """Distributions whose versions a dataset holds."""
 
-CHANGED = "+changes"
-"""Ending of `git_commit` if files differ from the commit."""
+CHANGED = "+changes"  # ending of `git_commit` if files differ from the commit
 
 PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
 """Sources of printed values by file name."""

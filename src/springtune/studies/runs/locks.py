@@ -18,8 +18,7 @@ from .source import TASKS, read_note
 STUDY_FILE, RUN_FILE = f"{TASKS}/study.json", f"{TASKS}/run.json"
 """Files in a study's folder: the path of the config that was run last, and the process that runs it."""
 
-LOCKED_NOTES: list[TextIO] = []
-"""Notes that this process has locked."""
+LOCKED_NOTES: list[TextIO] = []  # notes that this process has locked
 
 
 class LockedError(ValueError):

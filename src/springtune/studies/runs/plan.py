@@ -19,8 +19,7 @@ from . import attempts, store
 from .keys import inputs, stage_key
 from .source import PACKAGE, RECORDS, TASKS, checksum, hash_of, read_note
 
-MOST_JOBS = 64
-"""Most jobs of a stage."""
+MOST_JOBS = 64  # most jobs of a stage
 
 
 @dataclass
@@ -159,14 +158,12 @@ def rows(stage: Stage, study: Study, folder: Path) -> Iterator[dict[str, Any]]:
 
 # -- jobs after the stages ---------------------------------------------------------------------------------------------
 
-DATASET, SUMMARY, PAGE = "dataset.nc", "summary.txt", "index.html"
-"""Files that every study has."""
+DATASET, SUMMARY, PAGE = "dataset.nc", "summary.txt", "index.html"  # files that every study has
 
 COLLECT, BROWSE, PRESENT = "collect", "browse", "present"
 """Names of jobs after the stages; jobs of outputs begin with the last one."""
 
-PAPER, PAPER_FILE = "paper", "paper.pdf"
-"""The job that typesets the paper, and its product."""
+PAPER, PAPER_FILE = "paper", "paper.pdf"  # the job that typesets the paper, and its product
 
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 

@@ -7,8 +7,7 @@ from typing import Any
 
 PACKAGE = Path(__file__).parents[2]
 
-TASKS, RECORDS = "tasks", "done"
-"""Folders of a study: notes of jobs to do, and records of done jobs."""
+TASKS, RECORDS = "tasks", "done"  # folders of a study: notes of jobs to do, and records of done jobs
 
 CONFIG_FOLDER = Path("config")
 
@@ -41,8 +40,7 @@ def config_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
     return next(filter(Path.is_file, here), workflow_folder() / CONFIG_FOLDER / name)
 
 
-STATE = "SPRINGTUNE_SOURCE_STATE"
-"""Environment variable with the `source_state` at the begin of a run, for its jobs."""
+STATE = "SPRINGTUNE_SOURCE_STATE"  # environment variable with the `source_state` at the begin of a run, for its jobs
 
 
 def source_state() -> str:

@@ -22,11 +22,9 @@ if TYPE_CHECKING:
 
 SCALARS = "scalars"
 
-LAYOUT = 2
-"""Number of the layout of files, which changes with it."""
+LAYOUT = 2  # number of the layout of files, which changes with it
 
-Places = dict[str, dict[str, tuple[str, int]]]
-"""Dataset and row of arrays, by key and label."""
+Places = dict[str, dict[str, tuple[str, int]]]  # dataset and row of arrays, by key and label
 
 
 class DamagedError(Exception):

@@ -17,11 +17,9 @@ OTHER_APPROACHES = (
 )
 """Approaches of the benchmark besides definitions, see `springtune.studies.kinds.benchmark.solve`."""
 
-PARTS = ("meshing", "assembling", "factorizing", "solving")
-"""Timed parts of a case."""
+PARTS = ("meshing", "assembling", "factorizing", "solving")  # timed parts of a case
 
-THREAD_COUNTS = (1, 2)
-"""Numbers of threads of the benchmark's explicit steps."""
+THREAD_COUNTS = (1, 2)  # numbers of threads of the benchmark's explicit steps
 
 
 def approach_names(definitions: Iterable[str], mesh_types: Sequence[str], others: Iterable[str]) -> tuple[str, ...]:

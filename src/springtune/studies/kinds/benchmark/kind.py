@@ -19,8 +19,7 @@ from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
 
-MOST_RUNS = 100_000
-"""Most combinations of scenes, approaches and mesh sizes."""
+MOST_RUNS = 100_000  # most combinations of scenes, approaches and mesh sizes
 
 OtherApproach = Annotated[str, *one_of("approach", OTHER_APPROACHES)]
 Seconds = Annotated[float, Field(gt=0, le=3600, title="a number of seconds above 0, such as 0.5")]

@@ -34,14 +34,11 @@ from . import PARTS, THREAD_COUNTS
 
 REPETITIONS = 3
 
-LONG_CASE_SECONDS = 0.4
-"""Cases that take longer run once."""
+LONG_CASE_SECONDS = 0.4  # cases that take longer run once
 
-EXPLICIT_UPDATES = 4_000_000
-"""Springs times steps of a timed explicit run."""
+EXPLICIT_UPDATES = 4_000_000  # springs times steps of a timed explicit run
 
-FEWEST_STEPS = 50
-"""Fewest steps of a timed explicit run."""
+FEWEST_STEPS = 50  # fewest steps of a timed explicit run
 
 
 def failed(task, why):

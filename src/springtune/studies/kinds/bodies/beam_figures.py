@@ -31,8 +31,7 @@ from .tables import like_with_like
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 
-LARGEST_ERROR_SHOWN = 60.0
-"""Largest error shown [%]."""
+LARGEST_ERROR_SHOWN = 60.0  # largest error shown [%]
 
 
 def sensitivity(tree):
@@ -321,8 +320,7 @@ def _draw_deformed(panel, part):
 
 # -- errors ------------------------------------------------------------------------------------------------------------
 
-MOST_DEFINITIONS_IN_PANEL = 6
-"""Most definitions in one panel."""
+MOST_DEFINITIONS_IN_PANEL = 6  # most definitions in one panel
 
 
 def _draw_panels(ax, root, selection, beams, draw):
@@ -442,8 +440,7 @@ def _draw_over_sizes(panel, here, looks):
 
 # -- against what is swept ---------------------------------------------------------------------------------------------
 
-LOGARITHMIC_FROM_RATIO = 20.0
-"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
+LOGARITHMIC_FROM_RATIO = 20.0  # ratio of the largest to the smallest value from which an axis is logarithmic
 
 
 def sweep(tree):
@@ -567,8 +564,7 @@ ENERGY_DEFINITIONS = ("area", "delingette")
 FACES_SHOWN_FIRST = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
 """Definitions whose pressed faces are drawn first."""
 
-MOST_FACES = 5
-"""Networks in the panel of the pressed face."""
+MOST_FACES = 5  # networks in the panel of the pressed face
 
 
 def _pressing_load(names):

@@ -85,8 +85,7 @@ AT_FINITE_STRAIN = declared(
 SHAPE_FIELDS = declared("/shape_fields", dimensions={"case": "shape and load"}, further=MESH_ATTRIBUTES)
 """Networks to draw: of each shape and load on one mesh, displacements and forces with seven digits."""
 
-PRINTED_PREFIX = "paper_"
-"""Prefix of variables of printed cells, which have no swept dimensions."""
+PRINTED_PREFIX = "paper_"  # prefix of variables of printed cells, which have no swept dimensions
 
 
 def swept(group: Group, study: Study) -> Group:

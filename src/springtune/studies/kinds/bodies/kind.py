@@ -76,14 +76,12 @@ def shape_scenes_by_mesh(study):
 #
 # An interpolant has no whole fields, so references that need them are solved one by one.
 
-MOST_SOLVED_ALONE = 100
-"""Unit problems of one kind of load that are solved one by one, some 3 s; more are interpolated."""
+MOST_SOLVED_ALONE = 100  # unit problems of one kind of load that are solved one by one, some 3 s; more are interpolated
 
 ASPECT_STEPS_IN_DECADE = 10
 """Possible ends of a range of aspect ratios in a decade. So new aspect ratios mostly need no new interpolant."""
 
-NU_STEP = 0.05
-"""Distance of possible ends of a range of Poisson's ratios [1]."""
+NU_STEP = 0.05  # distance of possible ends of a range of Poisson's ratios [1]
 
 
 @cache_by_study
@@ -321,8 +319,7 @@ def calibrations(study):
 MOST_PARTICLES_DRAWN = 1500
 """Approximate number of particles of the largest mesh that is drawn, if there is a coarser one."""
 
-FILE_PARTICLES = 2000.0
-"""Assumed number of particles of a mesh file, for expected seconds."""
+FILE_PARTICLES = 2000.0  # assumed number of particles of a mesh file, for expected seconds
 
 WITHOUT_FINITE_STRAIN = ("reference.finite_shapes", "reference.finite_strain")
 

@@ -28,8 +28,7 @@ SWEPT_SHOWN = {
 
 PLOTS = "studies.kinds.bodies.beam_figures"
 
-TABLE_LABELS = ("load", "mesh_type", "material")
-"""Dimensions with one label in a table, as in the paper."""
+TABLE_LABELS = ("load", "mesh_type", "material")  # dimensions with one label in a table, as in the paper
 
 
 def stem(selection: Mapping[str, str], number: int | None = None) -> str:
@@ -70,17 +69,13 @@ def _sweeps(study: Study) -> dict[str, Mapping[str, object]]:
 
 MESH_AXES = ("shape", "mesh_type", "mesh_size")
 CASE_AXES = ("shape", "material", "load")
-SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
-"""Dimensions of the group ``/shapes``."""
+SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")  # dimensions of the group ``/shapes``
 
-GENERATED_MESH = "free"
-"""Mesh type of shapes with an outline: Delaunay triangles inside it."""
+GENERATED_MESH = "free"  # mesh type of shapes with an outline: Delaunay triangles inside it
 
-MESH_OF_FILE = "file"
-"""Mesh type of a shape with mesh files."""
+MESH_OF_FILE = "file"  # mesh type of a shape with mesh files
 
-SHAPES_OUTPUT = "shapes"
-"""Output that needs whole networks."""
+SHAPES_OUTPUT = "shapes"  # output that needs whole networks
 
 ERRORS_STEM, DEFORMED_STEM = "shapes_errors", "shapes_deformed"
 """Begins of the stems of the figures of a shape under a load."""

@@ -15,16 +15,14 @@ from springtune.reference.small_strain import ReferenceNotConvergedError, solve_
 from ...runs import store
 from ...runs.attempts import solve_files
 
-REFERENCE_TOLERANCE = 1e-4
-"""Largest error estimate of an interpolant [1], as of solved references."""
+REFERENCE_TOLERANCE = 1e-4  # largest error estimate of an interpolant [1], as of solved references
 
 WITHOUT_TEST = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
 WITH_TEST = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
 IN_PLANE_STRAIN = "is in plane strain: its reference is 'neo-hooke-plane-strain'"
 """Why a material has no reference of another law or plane."""
 
-POINTS_ALONG_SIDE = 24
-"""Points along a side of a drawn outline."""
+POINTS_ALONG_SIDE = 24  # points along a side of a drawn outline
 
 
 def run(content, attempts):

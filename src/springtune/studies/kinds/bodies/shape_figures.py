@@ -10,17 +10,13 @@ from ...output.answers import plane_vectors
 from ...output.dataset import STATUS, cells, choose, group, labels_of
 from .outputs import ERRORS_STEM, shape_figures
 
-NETWORKS_IN_ROW = 3
-"""Most networks side by side."""
+NETWORKS_IN_ROW = 3  # most networks side by side
 
-MOST_NETWORKS = 6
-"""Most networks without a choice of definitions."""
+MOST_NETWORKS = 6  # most networks without a choice of definitions
 
-SHOWN_FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
-"""Definitions that are preferred."""
+SHOWN_FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")  # definitions that are preferred
 
-REFERENCE_COLUMN = "reference to expected"
-"""Column of the errors of references."""
+REFERENCE_COLUMN = "reference to expected"  # column of the errors of references
 
 FORCE_COLOURS = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
 """Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""

@@ -504,11 +504,9 @@ MOST_SHAPE_SCENES = 100_000
 UNIT_NEEDED_FROM_METRES = 1.0
 """Longer side [m] from which the unit of a mesh file has to be given, or there is a warning."""
 
-EXTENT_TOLERANCE = 0.1
-"""Largest relative difference of the extents of meshes of one body: coarse ones cut off arcs."""
+EXTENT_TOLERANCE = 0.1  # largest relative difference of the extents of meshes of one body: coarse ones cut off arcs
 
-LARGEST_FILE_CHECKED = 1_000_000
-"""Size of a mesh file up to which its groups are looked at as a study is read [B]."""
+LARGEST_FILE_CHECKED = 1_000_000  # size of a mesh file up to which its groups are looked at as a study is read [B]
 
 
 def check(config, problems):

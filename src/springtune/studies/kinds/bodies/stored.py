@@ -33,8 +33,7 @@ def check_unchanged(source: dict[str, Any]) -> None:
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
 
 
-NOTES_KEY = "notes"
-"""Key of the only result in a mesh's note."""
+NOTES_KEY = "notes"  # key of the only result in a mesh's note
 
 
 def files(folder: str | Path, name: str) -> tuple[Path, Path]:
@@ -132,8 +131,7 @@ FIELD_ARRAYS = {
 """Types of stored arrays of particles and springs."""
 
 
-CALIBRATION_STEM = "calibration"
-"""Stem of the file of calibrated stiffnesses."""
+CALIBRATION_STEM = "calibration"  # stem of the file of calibrated stiffnesses
 
 
 def read_calibration(folder: str | Path) -> dict[str, Any]:

@@ -82,8 +82,7 @@ def _scene_table(data, selection):
     return found | {"number": number, "rows": rows, "note": _stiffnesses(rows)} | shown
 
 
-STATUS_MARKS = {"solved": "", "unstable": "u", "linear_only": "l"}
-"""Marks of networks with a displacement, by status."""
+STATUS_MARKS = {"solved": "", "unstable": "u", "linear_only": "l"}  # marks of networks with a displacement, by status
 
 
 def _page_cells(rows, definitions, swept, finite):

@@ -14,8 +14,7 @@ from springtune.problem.shapes import AssumptionWarning, LoadCase, Quantity, Sha
 
 from .stored import check_unchanged
 
-SHAPE_NAME, LOAD_NAME = "shape", "load"
-"""Names of a shape and of its load in tasks."""
+SHAPE_NAME, LOAD_NAME = "shape", "load"  # names of a shape and of its load in tasks
 
 
 def quantity_key(quantity: Quantity) -> str:
@@ -39,8 +38,7 @@ def load(case: LoadCase) -> dict[str, Any]:
     return asdict(replace(case, name=LOAD_NAME, quantities=tuple(plain)))
 
 
-_SHAPE_READER = TypeAdapter(Shape)
-"""Inverse of `asdict` for shapes."""
+_SHAPE_READER = TypeAdapter(Shape)  # inverse of `asdict` for shapes
 
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:

@@ -16,8 +16,7 @@ RUN = ("scene", "definition", "engine", *SETTING)
 RUN_COORDINATES = [f"scene_{part}" for part in ("beam", "mesh_type", "mesh_size", "material", "load", "force")]
 """Variables that describe scenes."""
 
-ENGINE_DIMENSIONS = declared_dimensions(__file__)
-"""Dimensions of these groups."""
+ENGINE_DIMENSIONS = declared_dimensions(__file__)  # dimensions of these groups
 
 FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
 

@@ -9,8 +9,7 @@ from ...output.dataset import choose, group, labels_of, table_rows
 from ...output.text import cell_text
 from . import RUN_ENDS, SETTING
 
-FRAME_SECONDS = 1 / 60
-"""Motion that costs refer to [s]."""
+FRAME_SECONDS = 1 / 60  # motion that costs refer to [s]
 
 
 def engines(tree):

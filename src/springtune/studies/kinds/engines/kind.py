@@ -19,14 +19,12 @@ from ...runs.keys import beam_key, declared_key, definition_key, distribution, m
 from ...runs.plan import Task
 from . import SETTING
 
-MOST_ENGINE_RUNS = 10_000
-"""Most combinations of one set of runs; each takes at least a tenth of a second."""
+MOST_ENGINE_RUNS = 10_000  # most combinations of one set of runs; each takes at least a tenth of a second
 
 RUN_KEYS = ("definition", "engine", *SETTING, "stiffness_factor")
 """Keys of a set of runs that list values, besides scenes."""
 
-OWN_PRECISION = "own"
-"""Precision that stands for the first one of an engine."""
+OWN_PRECISION = "own"  # precision that stands for the first one of an engine
 
 
 Count = Annotated[int, Field(ge=1, le=100_000, title="a whole number from 1 to 100000, such as 10")]

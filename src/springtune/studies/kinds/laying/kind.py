@@ -21,11 +21,9 @@ REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes of a reference over the given one; the first gives the answer, all give the error band."""
 
 LOADING, NETWORK = ("loading", "friction"), ("definition", "mesh_size")
-STRIP = (*NETWORK, *LOADING)
-"""Dimensions of a loading, of a network, and of a network under a loading."""
+STRIP = (*NETWORK, *LOADING)  # dimensions of a loading, of a network, and of a network under a loading
 
-MOST_STRIPS = 10_000
-"""Most strips of a study; each takes seconds."""
+MOST_STRIPS = 10_000  # most strips of a study; each takes seconds
 
 Friction = Annotated[float, Field(ge=0, le=2, title="a coefficient from 0 to 2, such as 0.3")]
 Loading = Annotated[str, *one_of("loading", LOADINGS)]

@@ -28,8 +28,7 @@ from springtune.problem.shapes import Beam
 from springtune.scene.mesh_cache import MeshCache
 from springtune.springs.base import DefinitionError
 
-RIGID_MODULUS_RATIO = 1e4
-"""Ratio of Young's moduli above which the trapezoid is rigid."""
+RIGID_MODULUS_RATIO = 1e4  # ratio of Young's moduli above which the trapezoid is rigid
 
 
 @dataclass(frozen=True)

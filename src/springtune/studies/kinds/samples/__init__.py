@@ -20,18 +20,15 @@ PARAMETERS = {
 }
 """Parameters of a sampled scene: dimension, meaning and unit."""
 
-SOBOL_INDICES = "sobol-indices"
-"""The design for Sobol indices: rows of a base sample differ in one parameter."""
+SOBOL_INDICES = "sobol-indices"  # the design for Sobol indices: rows of a base sample differ in one parameter
 
 DESIGNS = (SOBOL_INDICES, "sobol")
 
 SMALLEST_SIZE = 8
 
-MOST_SALTELLI_SAMPLES = 64
-"""Most base samples of a task for Sobol indices, each of several rows."""
+MOST_SALTELLI_SAMPLES = 64  # most base samples of a task for Sobol indices, each of several rows
 
-MOST_SOBOL_POINTS = 512
-"""Most points of a task of plain Sobol points."""
+MOST_SOBOL_POINTS = 512  # most points of a task of plain Sobol points
 
 
 def blocks(design: str, size: int) -> list[tuple[int, int]]:

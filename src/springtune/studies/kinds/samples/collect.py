@@ -28,8 +28,7 @@ SAMPLES = Group(
     further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
 )
 
-QUANTITIES = "displacement", "deformation_error", "best_stiffness"
-"""Quantities with Sobol indices."""
+QUANTITIES = "displacement", "deformation_error", "best_stiffness"  # quantities with Sobol indices
 
 ORDERS, ENDS = ("first", "total"), ("", "_low", "_high")
 """Orders of Sobol indices, and the ends of their bootstrap bands."""
@@ -151,11 +150,9 @@ def _indices(sample, data):
 
 BOOTSTRAP_SAMPLES = 1000
 
-BAND_LEVEL = 0.95
-"""Share of bootstrap samples within a band."""
+BAND_LEVEL = 0.95  # share of bootstrap samples within a band
 
-NEGLIGIBLE_DEVIATION = 1e-12
-"""Smallest standard deviation over the largest value that is more than rounding."""
+NEGLIGIBLE_DEVIATION = 1e-12  # smallest standard deviation over the largest value that is more than rounding
 
 
 SOBOL_ATTRIBUTES = {

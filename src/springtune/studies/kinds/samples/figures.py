@@ -9,8 +9,7 @@ PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": 
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
 """Names of parameters on an axis, where they are not their own."""
 
-INDEX_LIMITS = -0.3, 1.5
-"""Ends of the axis of Sobol indices at most, whose bands may go farther."""
+INDEX_LIMITS = -0.3, 1.5  # ends of the axis of Sobol indices at most, whose bands may go farther
 
 
 @style.styled

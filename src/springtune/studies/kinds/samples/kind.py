@@ -83,11 +83,9 @@ def _distribution(name: str, section: DistributionConfig) -> dict[str, Any]:
     return {"distribution": kind} | read
 
 
-MOST_SOLVED_ROWS = 1024
-"""Most rows of a sample whose references are solved one by one if they cannot be interpolated."""
+MOST_SOLVED_ROWS = 1024  # most rows of a sample whose references are solved one by one if they cannot be interpolated
 
-UNIFORM = "uniform"
-"""Definition of the best uniform stiffness."""
+UNIFORM = "uniform"  # definition of the best uniform stiffness
 
 SOLVE, INTERPOLATE = "studies.kinds.samples.solve", "studies.kinds.samples.interpolate"
 

@@ -19,14 +19,11 @@ from springtune.springs.base import DefinitionError
 from ...runs import store
 from . import draw
 
-DRAWN = "drawn"
-"""Key of the drawn parameters among the results of a task."""
+DRAWN = "drawn"  # key of the drawn parameters among the results of a task
 
-TASKS_TOGETHER = 32
-"""Tasks whose meshes are sorted together, so that more of them share a pattern."""
+TASKS_TOGETHER = 32  # tasks whose meshes are sorted together, so that more of them share a pattern
 
-SCALING_TOLERANCE = 1e-7
-"""Largest relative difference between a scaled and a solved result, for rounding."""
+SCALING_TOLERANCE = 1e-7  # largest relative difference between a scaled and a solved result, for rounding
 
 
 def run(content, attempts):

@@ -26,8 +26,7 @@ from springtune.springs.base import DefinitionError, Springs
 
 from . import AXES
 
-GROWTH_STEPS = 2000
-"""Steps of each run that measures a limit."""
+GROWTH_STEPS = 2000  # steps of each run that measures a limit
 
 
 def failed(task, why):
