@@ -246,7 +246,7 @@ def _reference_rows(study, answers):
         size = abs(one.force)
         scales = {"displacement": one.force, "error_estimate": 1.0, "rotation": size, "strain": size, "seconds": 1.0}
         values = {f"reference_{name}": scale * result[name] for name, scale in scales.items() if name in result}
-        yield labels | values | {"force": one.force, "reference_message": message}
+        yield {"force": one.force, "reference_message": message} | labels | values
 
 
 def _reference(study, folder, one, fields=()):
