@@ -105,8 +105,10 @@ class LoadedNetwork:
             return missing, norm(missing) / self.load_norm
 
         network, factor = self.network, self.network.rest_factor
-        start = np.zeros(network.held.shape) if self.given is None else self.given
-        first = start + network.expand(factor.solve(balance(start)[0]))
+        if self.given is None:
+            first = network.expand(factor.solve(self.load))
+        else:
+            first = self.given + network.expand(factor.solve(balance(self.given)[0]))
         here, error = refine(network, Iterate(first, *balance(first)), factor, balance, linear=True)
         return here.displacements, here.residual, error
 

@@ -132,9 +132,12 @@ class Pattern:
     def sum_springs(self, at_first: np.ndarray, at_second: np.ndarray | None = None) -> np.ndarray:
         """Sum over springs of what is added at their first ends and taken off at their second, by default the same."""
         count = self.shape[0]
-        ends = zip(at_first.T, (at_first if at_second is None else at_second).T)
-        parts = [np.bincount(self.first, a, count) - np.bincount(self.second, b, count) for a, b in ends]
-        return np.stack(parts, axis=1)
+        at_second = at_first if at_second is None else at_second
+        total = np.empty(self.shape)
+        for axis in range(2):
+            total[:, axis] = np.bincount(self.first, at_first[:, axis], count)
+            total[:, axis] -= np.bincount(self.second, at_second[:, axis], count)
+        return total
 
     def sum_cells(self, corners: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Sum over cells of what is added at their corners, shape (n_cells, m, 2)."""
@@ -184,8 +187,11 @@ class Pattern:
     def _own(self, couplings: np.ndarray) -> np.ndarray:
         """Return xx, xy and yy of each particle's own block, shape (3, n_points)."""
         count = self.shape[0]
-        pairs = [(couplings[a, d], couplings[d, a]) for a, d in ((0, 0), (0, 1), (1, 1))]
-        return -np.stack([np.bincount(self.first, a, count) + np.bincount(self.second, b, count) for a, b in pairs])
+        own = np.empty((3, count))
+        for place, (a, d) in enumerate([(0, 0), (0, 1), (1, 1)]):
+            own[place] = -np.bincount(self.first, couplings[a, d], count)
+            own[place] -= np.bincount(self.second, couplings[d, a], count)
+        return own
 
     def blocks(self, couplings: np.ndarray) -> Blocks:
         """Return the tangent in blocks, as `coupling_entries`, with zeros where directions are held."""

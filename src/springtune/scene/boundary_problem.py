@@ -217,6 +217,10 @@ class BeamProblem(BoundaryProblem):
         """Displacement of the reference [m]."""
         return {"displacement": self.reference(law).displacement}
 
+    def _value(self, one: Quantity, springs: Springs, network: Network, moved: np.ndarray) -> float:
+        """Displacement of the loaded side [m], by weights that the loads of a kind share."""
+        return self.sheet.displacement(self.kind, moved)
+
     def law(self, definition: Definition) -> str:
         """Law of the reference at finite strain: rubber's, or none."""
         return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
