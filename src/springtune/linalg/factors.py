@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 try:
     import cvxopt
     from cvxopt import cholmod
-except ImportError:
+except ModuleNotFoundError:  # one that does not load is an error
     cholmod = None
 
 CHOLESKY = cholmod is not None and os.environ.get("SPRINGTUNE_SOLVER") != "superlu"

@@ -17,7 +17,7 @@ from .kernels import Blocks, Chunks, Grid, row_pointers
 
 RESIDUAL = 1e-11  # residual over the right-hand side at which a solve ends
 
-STEP_RESIDUAL = 1e-6  # the same for a step of Newton's method
+STEP_RESIDUAL = 1e-6  # residual at which a solve for a step of Newton's method ends
 
 MAX_CG_ITERATIONS = 300
 
@@ -269,10 +269,12 @@ def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
 
 def dense(matrix: Blocks) -> np.ndarray:
     """Return the matrix as a full one."""
-    every, shape = np.arange(len(matrix.diagonal) + 1), (2 * len(matrix.diagonal),) * 2
-    parts = (matrix.blocks, matrix.columns, matrix.pointers), (matrix.diagonal[:, [0, 1, 1, 2]], every[:-1], every)
-    right, diagonal = (bsr_array((part.reshape(-1, 2, 2), *at), shape=shape).toarray() for part, *at in parts)
-    return right + right.T + diagonal
+    count = len(matrix.diagonal)
+    blocks = matrix.blocks.reshape(-1, 2, 2)
+    right = bsr_array((blocks, matrix.columns, matrix.pointers), shape=(2 * count, 2 * count)).toarray()
+    full, every = right + right.T, np.arange(count)
+    full.reshape(count, 2, count, 2)[every, :, every, :] = matrix.diagonal[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+    return full
 
 
 def chunked(matrix: Blocks, dtype: Any = float) -> Chunks:

@@ -311,7 +311,7 @@ class Contact:
         sides = [one.points[one.outline].transpose(1, 0, 2) for one in self.all]
         depths = [-places[:, 1].min() for places in corners[: len(self.bodies)] if self.floor]
         pairs = [pair for pair in permutations(range(len(self.all)), 2) if min(pair) < len(self.bodies)]
-        return float(max(0.0, *depths, *(_depth(corners[owner], *sides[target]) for owner, target in pairs)))
+        return float(max([0.0, *depths, *(_depth(corners[owner], *sides[target]) for owner, target in pairs)]))
 
     # -- mechanics -----------------------------------------------------------------------------------------------------
 

@@ -300,10 +300,10 @@ class _SheetEnergy(Energy):
     def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
         """Derivatives of D and of J by each corner's position [1/m], and the law; NaN for inverted triangles."""
         area, (along, across) = self._rest_area, self._rest_slopes
-        first, second, growth = self._distortions(moved)
-        by_x, by_y = first * along + second * across, second * along - first * across
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            first, second, growth = self._distortions(moved)
             law = self._law(first**2 + second**2, growth)
+        by_x, by_y = first * along + second * across, second * along - first * across
         return 2 * np.stack([by_x, by_y]) / area, area_slopes(self._rest + (moved - moved[:, :1])) / area, law
 
     def _distortions(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -196,8 +196,9 @@ class Network:
         pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
         resistance = -self._pattern.sum_springs(pull[:, None] * normals)
         if self.energies:
-            ends = (np.einsum(f"{places},nb->na", self._rest_couplings, apart) for places in ("abn", "ban"))
-            resistance += self._pattern.sum_springs(*ends)
+            at_first = np.einsum("abn,nb->na", self._rest_couplings, apart)
+            at_second = np.einsum("ban,nb->na", self._rest_couplings, apart)
+            resistance += self._pattern.sum_springs(at_first, at_second)
         return resistance
 
     @cached_property
@@ -377,8 +378,10 @@ class Network:
                 return factor
             raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
 
-        # A pressure's part: the load of s times its derivative.
-        besides = follower and self._pattern.loose_entries(follower[1].edges, -follower[0] * follower[1].derivative)
+        besides = None
+        if follower is not None:
+            s, load = follower
+            besides = self._pattern.loose_entries(load.edges, -s * load.derivative)
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
         takes_over = otherwise if next_one else None

@@ -389,8 +389,10 @@ class StaticProblem(LoadedNetwork):
                 if end is not None and np.isnan(lost):
                     guess = self.network.expand(end.u)
                     near = self.newton(there, guess)
-                    change = self.network.largest_change(near.displacements - guess)
-                    if near.converged and change <= SURPRISING_CHANGE and not self._is_unstable(there, near):
+                    far = not near.converged or (
+                        self.network.largest_change(near.displacements - guess) > SURPRISING_CHANGE
+                    )
+                    if not far and not self._is_unstable(there, near):
                         found, failed, missed = near, False, False
             if not failed and (step <= SHORTEST_STEP or not missed):
                 if leaves or missed and np.isnan(unstable):

@@ -19,7 +19,7 @@ OUTSIDE_TOLERANCE = 0.25  # how far outside the nearest cell a point may lie, ov
 CELL_TOLERANCE = 1e-6
 """How far outside a cell a point counts as in it, over the cell's size [1]: coordinates are rounded."""
 
-MOST_NEWTON_STEPS = 50  # newton steps that look for a point in a quadrilateral
+MOST_NEWTON_STEPS = 50  # Newton steps that look for a point in a quadrilateral
 
 
 def box(mesh: Mesh, sides: Iterable[Side]) -> GroupedMesh:

@@ -320,8 +320,10 @@ def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
 
 
 def strain_of(gradient: np.ndarray) -> np.ndarray:
-    """Green's strains xx, yy and 2 xy: a quadratic form is half of its derivative along its argument."""
-    return _strain_change(0.5 * gradient, gradient)
+    """Green's strains xx, yy and 2 xy."""
+    x, y = gradient[..., 0], gradient[..., 1]  # derivatives by x and by y
+    parts = [x[..., 0] + (x * x).sum(-1) / 2, y[..., 1] + (y * y).sum(-1) / 2, x[..., 1] + y[..., 0] + (x * y).sum(-1)]
+    return np.stack(parts, axis=-1)
 
 
 def _strain_change(gradient: np.ndarray, change: np.ndarray) -> np.ndarray:
@@ -428,6 +430,7 @@ class Yeoh(PlaneLaw):
 
     def __init__(self, coefficients: Sequence[float]) -> None:
         self._energy = Polynomial([0.0, *coefficients])
+        self._slopes = self._energy.deriv(1), self._energy.deriv(2)
 
     def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
         """Energy of t and d."""
@@ -435,7 +438,8 @@ class Yeoh(PlaneLaw):
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """Derivatives of W = sum_n c_n x^n with x = t + 1/d - 3."""
-        first, second = (self._energy.deriv(n)(trace + 1 / d - 3) for n in (1, 2))
+        excess = trace + 1 / d - 3
+        first, second = (slope(excess) for slope in self._slopes)
         by_d = -1 / d**2
         return (first, first * by_d), (second, second * by_d, second * by_d**2 + 2 * first / d**3)
 

@@ -20,7 +20,7 @@ from scipy import spatial
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.free import triangulate
 from ..mesh.sheets import GroupedMesh, part_names
-from ..mesh.sides import OutlineSide, Point
+from ..mesh.sides import OutlineSide, Point, turn
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
@@ -131,7 +131,9 @@ class CoarseMesh:
                 self.points, self.named = moved, self.named | {name: int(point)}
                 return
         corners = self.points[self.triangles]
-        shares = np.stack([_area(where, corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]) for i in range(3)], axis=1)
+        shares = 0.5 * np.stack(
+            [turn(where, corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]) for i in range(3)], axis=1
+        )
         row = int(np.argmax(shares.min(axis=1) / signed_areas(self.points, self.triangles)))
         a, b, c = (int(corner) for corner in self.triangles[row])
         new = len(self.points)
@@ -187,11 +189,6 @@ class CoarseMesh:
                 parts += [int(self.parts[row])] * 3
             self.points = np.concatenate([self.points, np.array(wheres)])
             self._replace(rows, triangles, parts)
-
-
-def _area(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> np.ndarray:
-    one, other = second - first, third - first
-    return 0.5 * (one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
 
 
 def _are_well_shaped(points: np.ndarray, triangles: np.ndarray) -> bool:
@@ -535,8 +532,7 @@ class Space:
     def __init__(self, mesh: CoarseMesh, degree: int) -> None:
         self.mesh, self.degree = mesh, degree
         self.corners = corners = np.sort(mesh.triangles, axis=1)
-        one, two = (mesh.points[corners[:, i]] - mesh.points[corners[:, 0]] for i in (1, 2))
-        self.sense = np.sign(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+        self.sense = np.sign(turn(*(mesh.points[corners[:, i]] for i in range(3))))
         n_points = len(mesh.points)
         pairs = np.concatenate([corners[:, pair] for pair in SIDE_CORNERS])
         codes, places = np.unique(pairs[:, 0] * n_points + pairs[:, 1], return_inverse=True)

@@ -41,7 +41,7 @@ from . import van_gelder
 from .base import Springs, definition, triangles_only
 from .identification import tested_body
 
-NU = 1 / 3  # poisson's ratio of springs alone [1]
+NU = 1 / 3  # Poisson's ratio of springs alone [1]
 
 TEST_DEGREE = 4  # degree of the displacements of the tests, one above that of the stresses
 

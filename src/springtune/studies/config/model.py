@@ -28,7 +28,7 @@ FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 STRAINED_REFERENCE = "neo-hooke-plane-strain"
 """Reference in plane strain; also for materials in plane stress, to compare."""
 
-TESTED_REFERENCE = "yeoh-plane-stress"  # the same for materials with a uniaxial test, using the fitted law
+TESTED_REFERENCE = "yeoh-plane-stress"  # reference of materials with a uniaxial test, by the fitted law
 
 FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE)
 
