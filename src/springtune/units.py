@@ -11,6 +11,10 @@ from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
 from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pint
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +132,17 @@ def _article(dimension: str) -> str:
 
 
 @cache
+def _registry() -> "pint.UnitRegistry[float]":
+    import pint  # here, since few studies need it
+
+    return pint.UnitRegistry()
+
+
+@cache
 def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     if _OTHER_NUMBER.search(_POWER.sub("", unit)):  # pint would evaluate 9^9^9^9
         return None
-    from pint import application_registry as registry  # here, since few studies need it
+    registry = _registry()
 
     try:
         given = registry.parse_units(unit)

@@ -177,7 +177,7 @@ def _answer_for_error(
 
 def _answer_for_engine(sheet: dict[str, Any], asked: dict[str, Any], loads: list[str], springs_alone: bool) -> Answer:
     """Calibration of an engine."""
-    from ..engines.base import ENGINES, Setting
+    from ..engines.base import ENGINES, EngineError, Setting
     from ..engines.calibration import best_runnable_scene, fit_engine
     from ..prediction.choices import USUAL_LOADS
     from ..scene.mesh_cache import choose
@@ -192,7 +192,10 @@ def _answer_for_engine(sheet: dict[str, Any], asked: dict[str, Any], loads: list
     body = options.read_body(sheet | {"load": load, "force": asked["force"]}, load, also=options.FOR_ENGINE)
     make = partial(Scene, body.body, body.mesh, body.material, str(body.load), asked["force"], scale=asked["scale"])
     if asked["definition"] is None:
-        scene, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
+        try:
+            scene, tried = best_runnable_scene(make, USUAL_LOADS, engine, setting, springs_alone)
+        except EngineError as error:  # of no option that was given
+            raise click.ClickException(str(error)) from None
     else:
         scene, tried = make(definition=asked["definition"]), ()
     fit = fit_engine(scene, engine.name, setting, loads=loads[1:] or None)

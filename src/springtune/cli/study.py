@@ -6,7 +6,7 @@ import subprocess
 import sys
 import warnings
 from collections import Counter
-from contextlib import suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from string import Template
@@ -239,10 +239,11 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
             return
     # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
     # begins with - is not an option behind =.
-    from snakemake.cli import main as snakemake  # here, since it takes half a second
-
     sys.argv = ["snakemake", *forced, *workflow, *options, f"--configfile={path}"]
-    snakemake(sys.argv[1:])
+    with redirect_stdout(sys.__stdout__), redirect_stderr(sys.__stderr__):  # its control characters are its own
+        from snakemake.cli import main as snakemake  # here, since it takes half a second, and keeps its streams
+
+        snakemake(sys.argv[1:])
 
 
 def set_cache() -> None:
@@ -250,7 +251,7 @@ def set_cache() -> None:
     usual = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
     with suppress(OSError):
         usual.mkdir(parents=True, exist_ok=True)
-    if not os.access(usual, os.W_OK):
+    if not (usual.is_dir() and os.access(usual, os.W_OK)):
         os.environ["XDG_CACHE_HOME"] = str(Path(".snakemake/cache").absolute())
         click.echo(f"note: {usual} cannot be written; .snakemake/cache stands in for it", err=True)
 

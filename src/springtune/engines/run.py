@@ -85,7 +85,7 @@ class EngineResult(Tabled, Ended):
         ``"rest"``; else, and why: ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the
         last frame; ``"inverted"``: it rests with cells turned inside out; or ``"diverged"``.
     frames, frame_seconds : int, float
-        Time that a frame took, without the first ones, which may compile [s]; NaN of a single frame.
+        Time that a frame took, without the first one, which may compile [s]; NaN of a single frame.
     swing : float
         Largest amplitude about the mean, where it swings [m].
     scene, engine, setting, factor, damping
@@ -347,20 +347,24 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
     """Advance a session until it rests: the way left, extrapolated from the last changes, is below `tolerance`."""
     seen: list[np.ndarray] = []
-    seconds: list[float] = []  # a frame
+    seconds: list[float] = []  # a frame, without the first one, which may compile
 
     def ended(displacements: np.ndarray, status: str, message: str, swing: float) -> Ended:
-        later = seconds[1:]  # the first frames may compile
-        return Ended(displacements, status, message, done, float(np.median(later)) if later else np.nan, swing)
+        return Ended(displacements, status, message, done, float(np.median(seconds)) if seconds else np.nan, swing)
 
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
         looks, size_of_window = [], min(window, most - done)
         each = ceil(size_of_window / LOOKS_PER_WINDOW)
         for begun in range(0, size_of_window, each):
-            count, begin = min(each, size_of_window - begun), time.perf_counter()
-            session.advance(count)
-            seconds.append((time.perf_counter() - begin) / count)
+            count = min(each, size_of_window - begun)
+            timed = count if done else count - 1
+            if not done:
+                session.advance(1)
+            if timed:
+                begin = time.perf_counter()
+                session.advance(timed)
+                seconds.append((time.perf_counter() - begin) / timed)
             done, now = done + count, session.displacements()
             size = float(np.abs(now).max())
             if not size <= DIVERGED_EXTENTS * extent:

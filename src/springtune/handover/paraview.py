@@ -32,7 +32,7 @@ def write_vtu(
     data = {}
     for name, given in cell_data.items():
         shape = next(iter(given.values())).shape[1:]
-        data[name] = [given.get(n, np.full((len(corners), *shape), np.nan)) for n, corners in present.items()]
+        data[name] = [given[n] if n in given else np.full((len(one), *shape), np.nan) for n, one in present.items()]
     grid = library().Mesh(
         flat(points),
         [(CELL_NAMES[count], corners) for count, corners in present.items()],

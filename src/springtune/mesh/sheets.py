@@ -346,6 +346,8 @@ def side_fault(grouped: GroupedMesh, name: str, directed: bool) -> str:
 
 def parts_of(grouped: GroupedMesh) -> list[str]:
     """Return the parts that have cells, sorted: ``""`` for the main part."""
+    if not grouped.parts:  # no look at each cell
+        return [""]
     return sorted({str(name) for labels in part_names(grouped).values() for name in labels})
 
 

@@ -381,7 +381,7 @@ class Trial:
         first.sheet.networks = len({one.loading.held.tobytes() for one in problems})
         self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
-        self._moduli: dict[tuple[bytes, ...], tuple[float, float]] = {}
+        self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamProblem) else None
         self._springs: dict[str, Springs] = {}
         self._first: dict[tuple[object, ...], str] = {}  # definition by its springs
@@ -473,14 +473,17 @@ class Trial:
         young = poisson = nan
         if self._test is not None:
             key = key_of(springs)
-            try:
-                if key not in self._moduli:
+            if key not in self._moduli:
+                try:
                     self._moduli[key] = self._test.axial(springs)
-                modulus, poisson = self._moduli[key]
+                except SingularError as error:
+                    self._moduli[key] = f"unstable: {error}"
+            if isinstance(found_moduli := self._moduli[key], str):
+                failures["patch test"] = found_moduli
+            else:
+                modulus, poisson = found_moduli
                 wanted = cast(Material, self.materials[0]).in_plane.young_modulus * self.thickness
                 young = modulus * springs.reference / wanted - 1
-            except SingularError as error:
-                failures["patch test"] = f"unstable: {error}"
         errors = {label: nan if isinstance(error, str) else error for label, error in found.items()}
         words = in_words(self.problems[0].sheet, springs)
         return Choice(name, *words, bool(springs.energies), errors, float(young), float(poisson), failures)

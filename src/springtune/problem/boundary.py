@@ -118,15 +118,19 @@ def followed(grouped: GroupedMesh, case: LoadCase, thickness: float) -> tuple[np
 
 def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
     """Return lumped masses [kg] (n_points,) from densities [kg/m3] by part, the main one at ``""``."""
-    points, labels = grouped.mesh.points, part_names(grouped)
-    masses = np.zeros(len(points))
+    known: dict[str, float] = {}
     for name in parts_of(grouped):
-        if densities.get(name) is None:
+        if (density := densities.get(name)) is None:
             body = f"part {name!r}" if name else "the body"
             raise ValueError(f"density: the material of {body} has none; give one such as '7850 kg/m^3'")
+        known[name] = density
+    if len({*known.values()}) == 1:
+        return known.popitem()[1] * thickness * grouped.mesh.particle_areas
+    points, labels = grouped.mesh.points, part_names(grouped)
+    masses = np.zeros(len(points))
     for count, corners in grouped.mesh.cells.items():
-        density = np.array([densities[name] for name in labels[count]], dtype=float)
-        np.add.at(masses, corners, (density * thickness * signed_areas(points, corners) / count)[:, None])
+        of_cells = np.array([known[name] for name in labels[count]])
+        np.add.at(masses, corners, (of_cells * thickness * signed_areas(points, corners) / count)[:, None])
     return masses
 
 

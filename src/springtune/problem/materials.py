@@ -357,7 +357,8 @@ class AnisotropicMaterial:
         shear = positive(shear_modulus, "stress", "shear_modulus")
         turn = quantity(angle, "angle", "angle")
         bound = math.sqrt(along / across)
-        if not (isinstance(poisson_ratio_xy, Real) and abs(poisson_ratio_xy) < bound):
+        is_number = isinstance(poisson_ratio_xy, Real) and not isinstance(poisson_ratio_xy, bool)
+        if not (is_number and abs(poisson_ratio_xy) < bound):
             given = f"material {name!r}: poisson_ratio_xy is {poisson_ratio_xy!r}, and its size must be below"
             root = f"sqrt(young_modulus_x / young_modulus_y) = {bound:.6g}"
             raise ValueError(f"{given} {root}; give the ratio for a pull along the fibres")

@@ -121,8 +121,12 @@ class BoundaryProblem(ABC):
         """First displacement among the quantities [m]; NaN where there is none."""
         for one in self.case.quantities:
             if one.kind == "displacement":
-                return float(np.tensordot(displacements, boundary.displacement_weights(self.grouped, one), axes=2))
+                return self._displacement(one, displacements)
         return np.nan
+
+    def _displacement(self, one: Quantity, moved: np.ndarray) -> float:
+        """Displacement of interest [m]."""
+        return float(np.tensordot(moved, boundary.displacement_weights(self.grouped, one), axes=2))
 
     def none(self) -> dict[str, float]:
         """Quantities of interest without an equilibrium: NaN."""
@@ -141,7 +145,7 @@ class BoundaryProblem(ABC):
         """Quantity of interest at displacements [m], in SI units."""
         linear = self.kinematics == "linear"
         if one.kind == "displacement":
-            return float(np.tensordot(moved, boundary.displacement_weights(self.grouped, one), axes=2))
+            return self._displacement(one, moved)
         if one.kind == "area":
             return _growth(self.mesh, moved, linear)
         if one.kind == "energy":
@@ -217,7 +221,7 @@ class BeamProblem(BoundaryProblem):
         """Displacement of the reference [m]."""
         return {"displacement": self.reference(law).displacement}
 
-    def _value(self, one: Quantity, springs: Springs, network: Network, moved: np.ndarray) -> float:
+    def _displacement(self, one: Quantity, moved: np.ndarray) -> float:
         """Displacement of the loaded side [m], by weights that the loads of a kind share."""
         return self.sheet.displacement(self.kind, moved)
 

@@ -395,8 +395,9 @@ def _fitted(
     constants, tables, noise, half = model.fit(assume_usual(constants, lacking), names)
     for block, table, one in zip(model.blocks, tables, noise):
         own, left = block.unshifted(block.values), one * table[:, 0]
-        share, excess = left @ left / (own @ own or 1), correlation_excess(block.by_place(left), block.places)
-        if block.places.ndim > 1 and share > 1 - EXPLAINED_SHARE and excess > 0:
+        share = left @ left / (own @ own or 1)
+        unexplained = block.places.ndim > 1 and share > 1 - EXPLAINED_SHARE
+        if unexplained and correlation_excess(block.by_place(left), block.places) > 0:
             explained = f"the load explains {100 * max(1 - share, 0):.0f} % of it"
             raise TestDataError(f"{block.label}: {explained}; check load, columns and signs")
     return lacking, constants, tables, noise, half

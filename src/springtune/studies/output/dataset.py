@@ -461,7 +461,9 @@ def in_own_plane(data: xr.Dataset) -> xr.Dataset:
 
 def select_own_law(finite: xr.Dataset) -> xr.Dataset | None:
     """Select the reference of each material's own law and plane; where none has a number, each says why."""
-    if not own_laws(found := variables(finite)):
+    # Large arrays are read on demand: only these are looked into.
+    found = variables(finite[[name for name in ("reference_displacement", "material_plane") if name in finite]])
+    if not own_laws(found):
         return None
     dims, law, _ = own_law(found)
     return in_own_plane(finite).isel(reference=xr.DataArray(law, dims=dims)).drop_vars("reference")

@@ -37,8 +37,13 @@ LARGEST_ERROR_SHOWN = 60.0  # largest error shown [%]
 def sensitivity(tree):
     """Stem, plotting function and selection of each figure of sensitivity curves."""
     present = group(tree, "sensitivity").status != 0
-    for stem, selection in distinct("sensitivity", SENSITIVITY_LABELS, cells(present, SENSITIVITY_LABELS)).items():
+    for stem, selection in selections("sensitivity", present, SENSITIVITY_LABELS):
         yield stem, plot_sensitivity, selection | {"kinematics": usual_kinematics(present.sel(selection))}
+
+
+def selections(name, present, labels=SCENE_LABELS):
+    """Stem and labels of each figure with cells."""
+    return distinct(name, labels, cells(present, labels)).items()
 
 
 USUAL_KINEMATICS = "nonlinear"
@@ -233,9 +238,10 @@ def deformed(tree):
     """Stem, plotting function and selection of each figure of deformed networks."""
     status = group(tree, "/").status
     status = status.sel(definition=group(tree, "fields").definition.values)
-    for stem, selection in distinct("deformed", SCENE_LABELS, cells(status != 0, SCENE_LABELS)).items():
+    for stem, selection in selections("deformed", status != 0):
         here = status.sel(selection)
-        present = here.isin((1, 2, 4)) if here.isin((1, 2, 4)).any() else here != 0
+        solved = here.isin((1, 2, 4))
+        present = solved if solved.any() else here != 0
         names = labels_of(present, "definition")
         definition = next((name for name in SHOWN_FIRST if name in names), names[0])
         kinematics = usual_kinematics(present.sel(definition=definition))
@@ -375,8 +381,7 @@ def _draw_lines(panel, places, here, looks, listed, gaps):
 
 def size(tree):
     """Stem, plotting function and selection of each figure of errors against mesh size."""
-    present = group(tree, "/").status != 0
-    for stem, selection in distinct("size", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
+    for stem, selection in selections("size", group(tree, "/").status != 0):
         yield stem, plot_size, selection
 
 
@@ -447,7 +452,7 @@ def sweep(tree):
     """Stem, plotting function and selection of each figure of a swept parameter."""
     present = group(tree, "/").status != 0
     for name in (name for name in SWEPT if present.sizes.get(name, 1) > 1):
-        for stem, selection in distinct(f"sweep_{name}", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
+        for stem, selection in selections(f"sweep_{name}", present):
             here = present.sel(selection)
             counts = {one: _most_values(here.sel(kinematics=one), name) for one in labels_of(here, "kinematics")}
             chosen = max(counts, key=lambda one: (counts[one], one == USUAL_KINEMATICS))
