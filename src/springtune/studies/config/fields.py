@@ -44,7 +44,7 @@ Notes = tuple[Any, ...]  # notes of an `Annotated`
 
 
 class Section(BaseModel):
-    """A mapping of known keys in a study; the docstring of a key is its meaning in the manual."""
+    """A mapping of known keys in a study; the docstring of a key is its meaning in the manual, which `tools/manual.py` writes."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
@@ -116,7 +116,7 @@ def declared(what: str, *sections: str, beside: Collection[str] = ()) -> AfterVa
     return AfterValidator(known)
 
 
-FILES = "files that a study names"  # key of their list in the context of validation
+FILES = "files that a study names"  # key of the list of files in the context of validation
 
 
 def _note_file(name: str, info: ValidationInfo) -> str:

@@ -39,7 +39,7 @@ Drawn = TypeVar("Drawn")
 
 COLUMN_WIDTH = 3.5  # width of a column of a journal with two [inch]
 
-PAGE_WIDTH = 7.16  # width of its page [inch]
+PAGE_WIDTH = 7.16  # width of the page of such a journal [inch]
 
 METRES_PER_INCH = 0.0254
 

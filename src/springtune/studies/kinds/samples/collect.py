@@ -17,7 +17,8 @@ from ...config.model import declared_variables
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
-from . import PARAMETERS, SOBOL_INDICES, blocks, problem_key, roles
+from . import PARAMETERS, SOBOL_INDICES, blocks, roles
+from .interpolate import problem_key
 from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
