@@ -44,7 +44,7 @@ Notes = tuple[Any, ...]  # notes of an `Annotated`
 
 
 class Section(BaseModel):
-    """A mapping of known keys in a study; the docstring of a key is its meaning in the manual, which `tools/manual.py` writes."""
+    """A mapping of known keys in a study; the docstring of a key is its meaning in the manual."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 

@@ -23,7 +23,7 @@ def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> No
     with reading.open(dataset) as tree:
         width, font_size = (float(tree.attrs.get(f"figure_{name}") or 0) for name in ("width", "font_size"))
         if width or font_size:
-            from . import style  # here: a job that only writes tables needs no matplotlib
+            from . import style  # here: tables of beams and shapes need no matplotlib
 
             style.choose(width, font_size)
         for output in (outputs(*names)[name] for name in names):

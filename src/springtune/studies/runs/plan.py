@@ -224,7 +224,8 @@ def _present_digest(study: Study, members: Iterable[Output], files: list[str]) -
     for one in members:
         used += filter(None, (name.partition(":")[0] for name in (one.module, one.write)))
         if one.page:
-            used += [name for name in modules("tables", "figures") if study.parts[name.split(".")[2]]]
+            shown = {"bodies", *(kind for kind, part in study.parts.items() if part)}  # as `present.write_page` takes
+            used += [name for name in modules("tables", "figures") if name.split(".")[2] in shown]
             templates.append(checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 
