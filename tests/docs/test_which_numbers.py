@@ -61,9 +61,9 @@ def test_springs_of_a_mesh_are_those_of_the_page():
     for mesh_type, row in {"structured": r"equilateral triangles", "braced": r"diagonals: sides"}.items():
         mesh = st.make_mesh(SHEET, mesh_type, "20 mm")
         found = st.DEFINITIONS["lattice"].springs(mesh, rubber, 1e-3)
-        inside, outline = shown(row + r" \| ([\d.]+) E h \| ([\d.]+) E h")
+        inside, outline = shown(row + r" \| ([\d.]+) E t \| ([\d.]+) E t")
         assert set(np.round(found.reference * found.relative / 5e3, 3)) == {inside, outline}
-    assert shown(r"both diagonals: diagonals \| ([\d.]+) E h") == [outline]
+    assert shown(r"both diagonals: diagonals \| ([\d.]+) E t") == [outline]
 
 
 def test_plane_stress_is_what_the_page_says():

@@ -66,7 +66,7 @@ def test_springs_of_newton(name):
 
 @pytest.mark.slow
 def test_triangles_of_newton_vbd():
-    """`tri_kd`, beta mu h / 2, damps shear as beta does, and a strip by (1 + nu^2) / (1 + nu) of it."""
+    """`tri_kd`, beta mu t / 2, damps shear as beta does, and a strip by (1 + nu^2) / (1 + nu) of it."""
     pytest.importorskip("newton")
     one, setting = scene("delingette"), st.Setting(1e-3, 5, 60)
     session = started(one, "newton-vbd", setting)

@@ -25,7 +25,7 @@ SIDES, SHARED = np.unique(
     np.sort(TRIANGLES[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_counts=True
 )
 NAMES = {
-    "E": 5e6, "nu": 0.3, "h": 1e-3, "rho": 1000.0, "points": POINTS, "triangles": TRIANGLES, "held": NODES[0].tolist(),
+    "E": 5e6, "nu": 0.3, "t": 1e-3, "rho": 1000.0, "points": POINTS, "triangles": TRIANGLES, "held": NODES[0].tolist(),
     "springs": SIDES, "k": 0.433 * 5e6 * 1e-3 * SHARED, "np": np,
 }  # fmt: skip
 FORCES = np.zeros_like(POINTS)

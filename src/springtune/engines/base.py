@@ -131,7 +131,7 @@ class Session(Protocol):
 
 @dataclass(frozen=True)
 class Parameter:
-    """Number that is typed into an engine: its unit, and its formula from E, nu, the thickness h and the mesh."""
+    """Number that is typed into an engine: its unit, and its formula from E, nu, the thickness t and the mesh."""
 
     unit: str
     formula: str

@@ -22,7 +22,7 @@ TYPED = {
     "stiffness": SPRING_STIFFNESS,
     "young": Parameter("Pa", "E"),
     "poisson": Parameter("1", "nu"),
-    "thickness": Parameter("m", "h"),
+    "thickness": Parameter("m", "t"),
 }
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 

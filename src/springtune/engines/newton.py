@@ -1,10 +1,10 @@
 """Newton (newton-physics) on the processor: springs, and triangles of a material, in its solvers VBD and XPBD.
 
-Formulas are from the kernels of Newton 1.8; mu and lambda are Lame's constants of plane stress, h is the thickness.
+Formulas are from the kernels of Newton 1.8; mu and lambda are Lame's constants of plane stress, t is the thickness.
 XPBD corrects all springs at once and diverges above the largest step of explicit schemes. It has no triangles, and
 ignores springs of negative stiffness. Triangles of VBD have the law
 
-    W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2],  tri_ke = mu h,  tri_ka = lambda h.
+    W = A_0 [mu t/2 (tr C - 2 J) + (lambda + mu) t/2 (J - 1)^2],  tri_ke = mu t,  tri_ka = lambda t.
 
 At a strain e, displacements differ by some 2 e from those by St. Venant-Kirchhoff's law, which `delingette` has.
 
@@ -28,8 +28,8 @@ from .base import SPRING_STIFFNESS, Parameter, Session, Setting, engine, refuse_
 LARGEST_VELOCITY = 1e30  # largest velocity [m/s]: none. By default Newton has 1e5
 
 TRIANGLES = {
-    "tri_ke": Parameter("N/m", "mu h = E h / (2 (1 + nu))"),
-    "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)"),
+    "tri_ke": Parameter("N/m", "mu t = E t / (2 (1 + nu))"),
+    "tri_ka": Parameter("N/m", "lambda t = E t nu / (1 - nu^2)"),
 }
 
 

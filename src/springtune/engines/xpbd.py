@@ -121,8 +121,8 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
         "biquadratic compliance": Parameter(
             "m3/N", "inverse of [[k1, g3, g2], [g3, k2, g1], [g2, g1, k3]] / 2, tensile k, coupling g, of l^2 - L^2"
         ),
-        "compressible compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
-        "incompressible compliance": Parameter("1/(N m)", "3 / (E h A0)"),
+        "compressible compliance": Parameter("1/(N m)", "1 / (G t A0), G = E / (2 (1 + nu))"),
+        "incompressible compliance": Parameter("1/(N m)", "3 / (E t A0)"),
     },
     typed=compliances,
     springs_first=True,

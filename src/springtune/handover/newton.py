@@ -1,8 +1,8 @@
 """Sheets for Newton (newton-physics), read and run with Newton 1.8: a script of its `ModelBuilder`.
 
-A triangle of Newton's solver VBD has Lame's constants of plane stress times the thickness h [N/m]
+A triangle of Newton's solver VBD has Lame's constants of plane stress times the thickness t [N/m]
 
-    tri_ke = mu h = E h / (2 (1 + nu)),    tri_ka = lambda h = E h nu / (1 - nu^2)
+    tri_ke = mu t = E t / (2 (1 + nu)),    tri_ka = lambda t = E t nu / (1 - nu^2)
 
 and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`, at small strain that of `delingette`.
 """

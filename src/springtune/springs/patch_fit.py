@@ -13,14 +13,15 @@ stress (tension, shear), 4 of linear (bending), 4 of quadratic (shear forces), 4
 that the sheet's energies ``G_ab = integral of t_a . u_b along the outline`` are the unit matrix.
 
 Let F have the tests' forces on the particles as columns, and K(k) be the stiffness of the free network. The network
-has ``M = F^T K^-1 F`` in place of the unit matrix 1. The springs minimise
+has ``M = F^T K^-1 F`` in place of the unit matrix I. The springs s = 1 to n minimise
 
-.. math:: \| M(k) - 1 \|^2 + \frac{\lambda}{n} \sum_e \ln^2 (k_e / k_{e,0})
+.. math:: \| M(k) - I \|^2 + \frac{\lambda}{n} \sum_s \ln^2 (k_s / k_{s,0})
 
 about those of `springtune.springs.van_gelder`, k0 (form for nu = 0: exact on lattices), with lambda = 0.1. With the
-elongations e = B K^-1 F of a spring, ``d M / d ln k_e = - k_e e e^T``: at most four Gauss-Newton steps, each one
-factorization of the mesh, 15 solves and a system of 120 unknowns. Logarithms keep every spring above zero, so any
-triangles are stable at rest. Turning, shifting or scaling the mesh does not change the springs.
+elongations e_s of a spring in the tests, a row of ``B K^-1 F``, ``d M / d ln k_s = - k_s e_s e_s^T``: at most four
+Gauss-Newton steps, each one factorization of the mesh, 15 solves and a system of 120 unknowns. Logarithms keep every
+spring above zero, so any triangles are stable at rest. Turning, shifting or scaling the mesh does not change the
+springs.
 
 Central springs have nu = 1/3 (Cauchy's relation), so the tests have that ratio and the wanted E, whatever nu is.
 Where cells repeat, Cauchy's relation holds in each: rows of isosceles triangles of base a and height h have ``C2222 /
