@@ -11,8 +11,17 @@ from springtune.safe_io import write_text
 from springtune.studies.config.fields import Section
 from springtune.studies.config.messages import words
 
+
+@classmethod
+def one_line_descriptions(cls, **_):
+    """Join the lines of the descriptions of a section's keys."""
+    for field in cls.model_fields.values():
+        field.description = field.description and " ".join(field.description.split())
+
+
 # Before the models of sections are made, and nowhere else: reading docstrings takes a tenth of Snakemake's start.
 Section.model_config["use_attribute_docstrings"] = True
+Section.__pydantic_init_subclass__ = one_line_descriptions
 
 from springtune.studies.config.model import kinds  # noqa: E402
 from springtune.studies.config.sections import study_model  # noqa: E402

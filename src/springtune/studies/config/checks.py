@@ -104,14 +104,15 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
 # -- counts ------------------------------------------------------------------------------------------------------------
 
 
-def most_scenes() -> int:
+def most_scenes(problems: Problems) -> int:
     """Return the limit of scenes, which the environment may change."""
     text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
     try:
         return int(float(text))
     except (ValueError, OverflowError):
         remedy = "give one such as 2000000, or none"
-        raise ValueError(f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; {remedy}") from None
+        problems.stop_at((), f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; {remedy}")
+        raise
 
 
 def check_count(
@@ -137,10 +138,7 @@ def check_product(problems: Problems, section: object, path: Place, labels: Iter
 
 def check_scenes(config: StudyConfig, problems: Problems) -> None:
     """Check the number of scenes, and of cells, before grids are expanded."""
-    try:
-        left, what = most_scenes(), "scenes"
-    except ValueError as error:
-        problems.stop_at((), str(error))
+    left, what = most_scenes(problems), "scenes"
     labels: dict[str, set[Any]] = defaultdict(set)
     for name, grid in config.grids.items():
         parts = factors(grid)

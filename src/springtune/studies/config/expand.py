@@ -1,6 +1,6 @@
 """Load a study from YAML: validate it, and expand its sections into meshes, scenes and curves, each once and sorted."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from functools import cache
@@ -54,16 +54,8 @@ def load(path: str | Path, kinds: tuple[StudyKind, ...]) -> Study:
     for kind in filter(lambda kind: kind.wanted(config), kinds):
         kind.check(config, problems)
     problems.stop()
-    bodies = declared(config, problems)
-    mesh_files = files_of_meshes(config, bodies.beams, problems)
-    grids = expand(config, bodies, mesh_files, problems)
-    checks.check_meshes(config, grids, problems)
-    checks.check_definitions(config, grids, problems)
-    problems.stop()
-    printed_path = path.parent / config.printed if config.printed else None
-    about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    about["files"] = tuple(path.parent / name for name in files)
-    return build(config, bodies, grids, kinds, problems, about)
+    about = {"name": path.stem, "path": path, "text": text, "files": tuple(path.parent / name for name in files)}
+    return build(config, kinds, problems, about)
 
 
 def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Problems) -> MeshFiles:
@@ -123,37 +115,29 @@ def swept(config: StudyConfig, references: Iterable[Reference]) -> tuple[str, ..
     return tuple(name for name in SWEPT if name in found or (name == "force" and len({*loaded}) < len(loaded)))
 
 
-def _body_makers(
-    known: Declared, files: MeshFiles
-) -> tuple[Callable[..., Beam], Callable[..., Material], Callable[..., MeshSpec | None]]:
-    """Functions that make each beam, material and mesh of a study once; a mesh is None if its file is missing."""
+def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
+    """Expand grids into scenes and curves; each beam, material and mesh is made once."""
 
     @cache
-    def beam(name: str, thickness: float | None) -> Beam:
-        return known.beams[name] if thickness is None else replace(known.beams[name], thickness=thickness)
+    def make_beam(name: str, thickness: float | None) -> Beam:
+        return bodies.beams[name] if thickness is None else replace(bodies.beams[name], thickness=thickness)
 
     @cache
-    def material(name: str, young_modulus: float | None, poisson_ratio: float | None) -> Material:
-        found = only_isotropic(known.materials[name], "put the sheet under 'shapes'")
+    def make_material(name: str, young_modulus: float | None, poisson_ratio: float | None) -> Material:
+        found = only_isotropic(bodies.materials[name], "put the sheet under 'shapes'")
         if isinstance(found, Rubber):  # it keeps the moduli of its law; `check_names` refuses others
             return found
         ratio = found.poisson_ratio if poisson_ratio is None else poisson_ratio
         return replace(found, young_modulus=young_modulus or found.young_modulus, poisson_ratio=ratio)
 
     @cache
-    def mesh(beam: Beam, mesh_type: str, size: float) -> MeshSpec | None:
+    def make_mesh(beam: Beam, mesh_type: str, size: float) -> MeshSpec | None:
         if mesh_type in MESH_TYPES:
             return MeshSpec(beam, mesh_type, size)
-        # A file is of a beam's extent; its thickness is the combination's.
-        found = files.get((mesh_type, beam.name, size))
+        # A file is of a beam's extent; its thickness is the combination's. It may be missing.
+        found = mesh_files.get((mesh_type, beam.name, size))
         return found if found is None or found.beam == beam else replace(found, beam=beam)
 
-    return beam, material, mesh
-
-
-def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
-    """Expand grids into scenes and curves."""
-    make_beam, make_material, make_mesh = _body_makers(bodies, mesh_files)
     grids = []
     for name, grid in config.grids.items():
         scenes: list[SceneSpec] = []
@@ -206,15 +190,14 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
     return curves
 
 
-def build(
-    config: StudyConfig,
-    bodies: Declared,
-    grids: tuple[Grid, ...],
-    kinds: Sequence[StudyKind],
-    problems: Problems,
-    about: dict[str, Any],
-) -> Study:
-    """Build the study with the parts of all study kinds."""
+def build(config: StudyConfig, kinds: Sequence[StudyKind], problems: Problems, about: dict[str, Any]) -> Study:
+    """Build the study with the parts of all study kinds; `about` has its name, path, text and files."""
+    bodies = declared(config, problems)
+    mesh_files = files_of_meshes(config, bodies.beams, problems)
+    grids = expand(config, bodies, mesh_files, problems)
+    checks.check_meshes(config, grids, problems)
+    checks.check_definitions(config, grids, problems)
+    problems.stop()
     # By their places: hashing a beam and a material for each of 100,000 scenes is slow.
     every = [scene for grid in grids for scene in grid.scenes]
     loaded = {(id(one.mesh.beam), id(one.material), one.load, one.force): one for one in every}
@@ -244,12 +227,14 @@ def build(
     made = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     calibrated = config.definitions.calibrated
+    printed_path = problems.folder / config.printed if config.printed else None
     study = Study(
         title=config.title,
         meshes=meshes,
         scenes=scenes,
         curves=in_order(curves),
         references=in_order(references),
+        mesh_files=mesh_files,
         outputs=tuple(name for name in made if name in config.outputs),
         style=config.style.model_dump(exclude_none=True),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
@@ -259,7 +244,8 @@ def build(
         stiffness_ratios=tuple(COEFFICIENT * (first + (last - first) * n / (points - 1)) for n in range(points)),
         stiffness_table={(row.mesh_type, row.material): row.value for row in checks.stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
-        printed=read_printed(about["printed_path"], config, problems) if config.printed else (),
+        printed=read_printed(printed_path, config, problems) if printed_path else (),
+        printed_path=printed_path,
         axes=_axes(ranks, used, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
         swept=names,
         **about,
@@ -318,7 +304,7 @@ def add_rows(content: Any, problems: Problems, files: list[str]) -> None:
         where, path = ("grids", name), problems.folder / file
         example = "a head such as beam,mesh_size [mm],force and a line for each combination"
         (first, head), *rows = _table(path, (*where, "rows"), problems, example)
-        problems.located((*where, "rows"), f"{path}:{first}")
+        problems.places[(*where, "rows")] = f"{path}:{first}"
         columns: dict[str, list[str]] = {}
         for place, cell in enumerate(head):
             key, _, unit = (part.strip(" ]") for part in cell.partition("["))
@@ -327,8 +313,7 @@ def add_rows(content: Any, problems: Problems, files: list[str]) -> None:
             if key in columns or grid.get(key) is not None:
                 problems.add((*where, key), f"'{file}' has a column '{key}', too; remove one of them")
             columns[key] = [f"{row[place].strip()} {unit}".strip() for _, row in rows]
-            for item, (line, _) in enumerate(rows):
-                problems.located((*where, key, item), f"{path}:{line}")
+            problems.places |= {(*where, key, item): f"{path}:{line}" for item, (line, _) in enumerate(rows)}
         problems.stop()
         grid |= {key: tuple(values) for key, values in columns.items()} | {"rows": [file, *columns]}
         files.append(file)

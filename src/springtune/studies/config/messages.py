@@ -48,7 +48,7 @@ class Problems:
 
     def __init__(self, file: str, lines: Lines | None = None, content: Any = None, folder: Path = Path()) -> None:
         self._file, self._lines, self.content, self.folder = file, lines or {}, content, folder
-        self._places: dict[tuple[Key, ...], str] = {}
+        self.places: dict[tuple[Key, ...], str] = {}  # of values that come from other files
         self._found: list[tuple[int, str]] = []
 
     def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
@@ -57,13 +57,9 @@ class Problems:
         # A missing key has no line, so the line of its section is used.
         above = (path[:size] for size in range(len(path), 0, -1))
         line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
-        place = self._places.get(path) or (f"{self._file}:{line}" if line else self._file)
+        place = self.places.get(path) or (f"{self._file}:{line}" if line else self._file)
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{clipped(key)}" for key in path).removeprefix(".")
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
-
-    def located(self, path: tuple[Key, ...], place: str) -> None:
-        """Set the place of a value that comes from another file."""
-        self._places[path] = place
 
     @property
     def nothing(self) -> bool:
@@ -106,9 +102,7 @@ def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
 
 def words(annotation: Any) -> str:
     """Words for a value of a field or type: its title, or a description."""
-    if isinstance(annotation, FieldInfo):
-        return annotation.title or words(Annotated[annotation.annotation, "a field", *annotation.metadata])
-    origin, (inside, *notes) = get_origin(annotation), get_args(annotation) or (None,)
+    origin, (inside, *notes) = _parts(annotation)
     if origin is Annotated:
         found = next((note.title for note in notes if isinstance(note, FieldInfo) and note.title), words(inside))
         is_range = any(isinstance(note, OrSection) for note in notes)
@@ -116,12 +110,18 @@ def words(annotation: Any) -> str:
     if origin in (Union, UnionType):
         return words(inside)
     if origin is list:
-        given = words(inside)
-        return "a list of sections" if given == SECTION else f"{given}, or a list"
+        return "a list of sections" if words(inside) == SECTION else f"{words(inside)}, or a list"
     return SECTION
 
 
 SECTION = "a section"
+
+
+def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Origin and arguments of a type; a field is its type, annotated."""
+    if isinstance(annotation, FieldInfo):
+        annotation = Annotated[annotation.annotation, annotation, *annotation.metadata]
+    return get_origin(annotation), get_args(annotation) or (None,)
 
 
 class OrSection(NamedTuple):
@@ -132,9 +132,7 @@ class OrSection(NamedTuple):
 
 def _branches(annotation: Any) -> Iterator[Any]:
     """Types that a field or type may be: sections, lists, mappings and single values."""
-    if isinstance(annotation, FieldInfo):
-        annotation = Annotated[annotation.annotation, "a field", *annotation.metadata]
-    origin, parts = get_origin(annotation), get_args(annotation)
+    origin, parts = _parts(annotation)
     if origin is Annotated:
         parts = parts[0], *(note.section for note in parts[1:] if isinstance(note, OrSection))
     if origin in (Annotated, Union, UnionType):
@@ -220,13 +218,9 @@ def show(value: object) -> str:
     >>> show("200 mm"), show([]), show({"length": "1 m"})
     ("'200 mm'", 'an empty list', 'a mapping')
     """
-    if isinstance(value, dict):
-        return "a mapping" if value else "an empty mapping"
-    if isinstance(value, list):
-        return "a list" if value else "an empty list"
-    if value is None:
-        return "nothing"
-    return f"'{clipped(str(value))}'"
+    if isinstance(value, dict | list):
+        return f"{'a' if value else 'an empty'} {'mapping' if isinstance(value, dict) else 'list'}"
+    return "nothing" if value is None else f"'{clipped(str(value))}'"
 
 
 def control_character_fault(text: str) -> str:

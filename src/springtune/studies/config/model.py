@@ -232,13 +232,10 @@ def shown(scenes: Iterable[SceneSpec], swept: Iterable[str]) -> frozenset[SceneS
         bodies[scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name, scene.load].append(scene)
     for own in bodies.values():
         coarsest = max(scene.mesh.mesh_size for scene in own)
-        ranks = {
-            scene: [shown_order(name, swept_value(scene, scene.mesh.beam, name)) for name in names]
-            for scene in own
-            if scene.mesh.mesh_size == coarsest
-        }
-        last = max(ranks.values())
-        found |= {scene for scene, rank in ranks.items() if rank == last}
+        there = [scene for scene in own if scene.mesh.mesh_size == coarsest]
+        ranks = [[shown_order(name, swept_value(one, one.mesh.beam, name)) for name in names] for one in there]
+        last = max(ranks)
+        found |= {scene for scene, rank in zip(there, ranks) if rank == last}
     return frozenset(found)
 
 

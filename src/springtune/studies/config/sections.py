@@ -141,10 +141,9 @@ class MaterialConfig(Section):
         for key in form:
             if getattr(self, key) is None:
                 raise refuse(f"'{key}' is missing; give {words(type(self).model_fields[key])}", key)
-        if self.uniaxial_test is not None:
-            return self  # files are read by who knows where they are
         try:
-            self.material("material")
+            if self.uniaxial_test is None:  # files are read by who knows where they are
+                self.material("material")
         except ValueError as error:
             raise refuse(str(error).removeprefix("material 'material': ")) from None
         return self
@@ -154,14 +153,9 @@ class MaterialConfig(Section):
         if self.uniaxial_test is not None:
             from springtune.problem.materials import fit_rubber
 
-            others = {"equibiaxial": self.equibiaxial_test, "pure_shear": self.pure_shear_test}
-            return fit_rubber(
-                folder / self.uniaxial_test,
-                **{key: folder / file for key, file in others.items() if file is not None},
-                terms=self.terms or MOST_TERMS,
-                density=self.density,
-                name=name,
-            )
+            files = {key: getattr(self, f"{key}_test") for key in ("uniaxial", "equibiaxial", "pure_shear")}
+            tests = {key: folder / file for key, file in files.items() if file}
+            return fit_rubber(**tests, terms=self.terms or MOST_TERMS, density=self.density, name=name)
         if self.young_modulus is not None and self.poisson_ratio is not None:
             return Material(self.young_modulus, self.poisson_ratio, self.density, name, self.plane or "stress")
         if self.stiffness is not None:
@@ -347,11 +341,10 @@ SAME_VALUE = 1e-9  # relative difference below which two numbers are the same va
 def factors(grid: GridConfig) -> list[Factor]:
     """Factors whose product is all combinations of a grid; forces by beam, material or load go with it."""
     columns = tuple(grid.rows[1:])
-    names = [name for name in GRID_PARAMETERS if getattr(grid, name) and name not in columns]
-    found: list[Factor] = []
-    for group in filter(None, (columns, *((name,) for name in names))):
-        if group != ("force",) or not isinstance(grid.force, dict):
-            found.append((group, list(zip(*(getattr(grid, name) for name in group), strict=True))))
+    apart = {*columns, "force"} if isinstance(grid.force, dict) else {*columns}
+    names = [name for name in GRID_PARAMETERS if getattr(grid, name) and name not in apart]
+    groups = filter(None, (columns, *((name,) for name in names)))
+    found = [(group, [*zip(*(getattr(grid, name) for name in group), strict=True)]) for group in groups]
     if isinstance(grid.force, dict):
         place = next(number for number, (group, _) in enumerate(found) if grid.force_owner in group)
         group, rows = found[place]

@@ -214,7 +214,7 @@ def _check(config, problems):
     if not sample.varied:
         problems.add(where, "nothing varies; give at least one parameter a range such as {from: 100 mm, to: 400 mm}")
     check_able(problems, ("samples", "definition"), sample.definition, [sample.mesh_type], sample.load)
-    most = most_scenes()
+    most = most_scenes(problems)
     if sample.scenes > most:
         each = f"{sample.each} rows x {len(sample.load)} loads x {len(sample.definition)} definitions"
         what = f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {most}"
