@@ -4,8 +4,8 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, TextIO, cast
 
@@ -35,6 +35,16 @@ class WrongCall(click.ClickException):
     """A command was called with wrong options."""
 
     exit_code = 2
+
+
+@contextmanager
+def file_errors(place: str, remedy: str = "give a file that can be written") -> Iterator[None]:
+    """Context of writing a file, whose errors name the place and the remedy."""
+    try:
+        yield
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else error
+        raise click.ClickException(f"{place}: {why}; {remedy}") from None
 
 
 COMMANDS = {

@@ -1,9 +1,7 @@
 """Options that commands share: beams, shapes, meshes, materials."""
 
 import math
-import os
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce, wraps
 from pathlib import Path
@@ -16,6 +14,7 @@ from ..problem.quantities import PLANES, nearest, positive
 from ..problem.shapes import Beam
 from ..safe_io import mesh_size_text, number_of
 from ..studies.runs.source import is_source_tree
+from . import PATH
 
 if TYPE_CHECKING:
     from ..mesh.cells import Mesh
@@ -24,16 +23,6 @@ if TYPE_CHECKING:
     from ..problem.shapes import Shape
     from ..studies.config.model import Study
     from ..studies.kinds.bodies.shapes import Shapes
-
-
-@contextmanager
-def file_errors(option: str, target: Path) -> Iterator[None]:
-    """Context of writing the file of an option, whose errors name both."""
-    try:
-        yield
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno else error
-        raise click.ClickException(f"{option}: {target}: {why}; give a file that can be written") from None
 
 
 SPRING_FILES = ".csv, .json, .vtu (ParaView), .xml, .mjcf (MuJoCo), .py (SOFA), .newton.py (Newton), .xpbd.json (XPBD)"
@@ -258,9 +247,7 @@ def target_option(name: str, meaning: str, required: bool = False) -> Callable[[
         return target
 
     meaning = f"{meaning}: {SPRING_FILES}."
-    return click.option(
-        name, "target", required=required, type=click.Path(path_type=Path), callback=check, help=meaning
-    )
+    return click.option(name, "target", required=required, type=PATH, callback=check, help=meaning)
 
 
 Options = dict[str, dict[str, Any]]  # options of a command by name, with keywords as click takes them

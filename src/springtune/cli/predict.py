@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import PATH, command, options
+from . import PATH, command, file_errors, options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -117,7 +117,7 @@ def predict(
     click.echo(text)
     if target is not None:
         net = make()
-        with options.file_errors("--write", target):
+        with file_errors(f"--write: {target}"):
             click.echo(f"\n{written_text(net, net.write(target))}")
 
 
@@ -240,7 +240,7 @@ def springs(sheet: dict[str, Any], load: str | None, target: Path, **how: Any) -
     from .recommendation import written_text
 
     net = _net(options.read_body(sheet, load), **how)
-    with options.file_errors("--out", target), warnings.catch_warnings(record=True) as heard:
+    with file_errors(f"--out: {target}"), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)
         written = net.write(target)
     click.echo(written_text(net, written))

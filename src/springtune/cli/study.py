@@ -18,7 +18,7 @@ from ..problem.quantities import nearest
 from ..registry import NAME, NAME_RULE, how_to_install
 from ..safe_io import aligned, write_bytes, write_text
 from ..studies.runs.source import CONFIG_FOLDER, TASKS, USUAL_STUDY, config_file, is_source_tree, workflow_folder
-from . import PATH, WrongCall, command
+from . import PATH, WrongCall, command, file_errors
 
 if TYPE_CHECKING:
     from ..studies.config.model import Study
@@ -50,14 +50,11 @@ def new(study: str, shape: bool, source: str | None) -> None:
         raise click.ClickException(f"{path.parent}: there is no such folder; make it, or name another")
     if shape and source:
         raise WrongCall(f"--shape means nothing beside --from {source}; leave one of the two out")
-    try:
+    with file_errors(f"{path}: cannot be written", "name another place"):
         if source:
             _copy(source, path)
         else:
             write_text(path, template_text(path, "shape" if shape else "beam"))
-    except OSError as error:
-        why = error.strerror or error
-        raise click.ClickException(f"{path}: cannot be written: {why}; name another place") from None
     scenes = "" if source else "4 scenes; " if shape else "2 scenes; "
     click.echo(f"{path}: {scenes}change it as you like, and run it:\n  springtune run {path}")
 
@@ -156,12 +153,8 @@ def definitions() -> None:
     """List the definitions of spring stiffness."""
     from .. import DEFINITIONS
 
-    others = DEFINITIONS.packages
-    rows = [
-        [name, f"{one.summary} ({others[name]})" if name in others else one.summary]
-        for name, one in DEFINITIONS.items()
-    ]
-    click.echo(aligned(rows, left=2))
+    packages = {name: f" ({package})" for name, package in DEFINITIONS.packages.items()}
+    click.echo(aligned([[name, one.summary + packages.get(name, "")] for name, one in DEFINITIONS.items()], left=2))
 
 
 # -- run ---------------------------------------------------------------------------------------------------------------
@@ -212,12 +205,9 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
     forced: list[str] = []
-    try:
+    with file_errors(f"--results {folder}", "name a folder that can be written"):
         folder.mkdir(parents=True, exist_ok=True)
         os.chdir(folder)
-    except OSError as error:
-        why = f"{error.strerror}; name a folder that can be written"
-        raise click.ClickException(f"--results {folder}: {why}") from None
     set_cache()
     if _computes(options) or _is_dry_run(options):
         study = study if path == shown else _load(path)  # its files are seen from here
@@ -316,8 +306,9 @@ def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
 
     each = [plan.outdated(study, _results(study)) for study in studies]
     found = {record: why for one in each for record, why in (one or {}).items()}
-    for why in filter(plan.is_missing, found.values()):
-        click.echo(f"{why}; {remedy}", err=True)
+    for why in found.values():
+        if why.endswith(plan.MISSING):
+            click.echo(f"{why}; {remedy}", err=True)
     return found if found or None not in each else None
 
 

@@ -127,34 +127,28 @@ def failure_reason(error: Exception) -> str:
 
 def solve_files(module: ModuleType, content: dict[str, Any], attempts: Attempts) -> None:
     """Do the tasks of a job's files whose results are missing."""
-    for file in content["files"]:
-        _solve_file(module, content, file, attempts)
-
-
-def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any], attempts: Attempts) -> None:
-    path = Path(content["folder"]) / f"{file['name']}.h5"
     failed = getattr(module, "failed", lambda task, why: {"status": Status.FAILED, "message": why})
     parts = getattr(module, "parts", lambda task, result: {task["key"]: result})
-    present = store.stored_keys(path)
-    tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
-    missing = [task for task in tasks if not parts(task, {}).keys() <= present]
-    if not missing:
-        return
-    shared: list[Any] = []
-    if hasattr(module, "prepare"):
-        shared = [attempts.attempt(file["name"], partial(module.prepare, file, content), RefusedError)]
-        if shared == [None]:
-            return
-    with store.ResultBuffer(path) as keeper:
-        for task in sorted(missing, key=module.order) if hasattr(module, "order") else missing:
-            if shared and isinstance(shared[0], RefusedError):
-                result = failed(task, f"mesh: {shared[0]}")
-            else:
-                solve = partial(module.solve, task, *shared)
-                result = attempts.attempt(task["key"], solve, partial(failed, task))
-            if result is None:
-                continue
-            attempts.computed += 1
-            for key, part in parts(task, result).items():
-                if key != task["key"] or key not in present:  # stored numbers stay unchanged
-                    keeper[key] = part
+    for file in content["files"]:
+        path = Path(content["folder"]) / f"{file['name']}.h5"
+        present = store.stored_keys(path)
+        tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
+        missing = [task for task in tasks if not parts(task, {}).keys() <= present]
+        shared: list[Any] = []
+        if missing and hasattr(module, "prepare"):
+            shared = [attempts.attempt(file["name"], partial(module.prepare, file, content), RefusedError)]
+        if not missing or shared == [None]:
+            continue
+        with store.ResultBuffer(path) as keeper:
+            for task in sorted(missing, key=module.order) if hasattr(module, "order") else missing:
+                if shared and isinstance(shared[0], RefusedError):
+                    result = failed(task, f"mesh: {shared[0]}")
+                else:
+                    solve = partial(module.solve, task, *shared)
+                    result = attempts.attempt(task["key"], solve, partial(failed, task))
+                if result is None:
+                    continue
+                attempts.computed += 1
+                for key, part in parts(task, result).items():
+                    if key != task["key"] or key not in present:  # stored numbers stay unchanged
+                        keeper[key] = part

@@ -219,15 +219,11 @@ def _files_below(root: Path, parts: list[str]) -> set[Path]:
 @cache
 def distribution(package: str) -> str:
     """Distribution that contains a package, as ``scikit-fem`` for ``skfem``."""
-    if package in DISTRIBUTIONS:
-        return DISTRIBUTIONS[package]
-    from importlib.metadata import PackageNotFoundError, packages_distributions, version
+    if package in DISTRIBUTIONS or version_of(package) != "none":
+        return DISTRIBUTIONS.get(package, package)
+    from importlib.metadata import packages_distributions
 
-    try:
-        version(package)
-    except PackageNotFoundError:
-        return packages_distributions().get(package, [package])[0]
-    return package
+    return packages_distributions().get(package, [package])[0]
 
 
 @cache

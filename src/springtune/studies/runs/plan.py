@@ -246,7 +246,7 @@ def paper_job(source: Path, datasets: Iterable[Path], folder: Path) -> Job:
     return Job(folder, PAPER, digest, (str(folder / PAPER_FILE),), tuple(map(str, datasets)))
 
 
-MISSING = " is missing"
+MISSING = " is missing"  # end of the reason of a missing product
 
 
 def rerun_reason(job: Job) -> str:
@@ -261,11 +261,6 @@ def rerun_reason(job: Job) -> str:
     made = job.record.stat().st_mtime_ns
     newer = (path for path in map(Path, job.reads) if path.exists() and path.stat().st_mtime_ns > made)
     return next((f"{path} is newer" for path in newer), "")
-
-
-def is_missing(why: str) -> bool:
-    """Return whether a reason is a missing file."""
-    return why.endswith(MISSING)
 
 
 def outdated(study: Study, folder: Path) -> dict[Path, str] | None:
