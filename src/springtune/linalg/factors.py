@@ -234,6 +234,13 @@ def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np
     return None
 
 
+def entry_places(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows and columns of the entries of matrices over unknowns (n, ...), one matrix after another."""
+    unknowns = numbers.reshape(len(numbers), -1)
+    width = unknowns.shape[1]
+    return np.repeat(unknowns, width, axis=1).ravel(), np.tile(unknowns, width).ravel()
+
+
 LEAF = 48  # particles of a part that is not cut any more
 
 
@@ -262,8 +269,9 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
         low[left] = True
         lengths = pointers[right + 1] - pointers[right]
         # All neighbours of all particles of the right part, one after the other.
-        places = np.repeat(pointers[right] - np.r_[0, np.cumsum(lengths)[:-1]], lengths) + np.arange(lengths.sum())
-        touches = np.logical_or.reduceat(low[neighbours[places]], np.r_[0, np.cumsum(lengths)[:-1]])
+        starts = np.cumsum(lengths) - lengths
+        places = np.repeat(pointers[right] - starts, lengths) + np.arange(lengths.sum())
+        touches = np.logical_or.reduceat(low[neighbours[places]], starts)
         low[left] = False
         separator, right = right[touches], right[~touches]
         separator = separator[np.argsort(across[~below][touches], kind="stable")]

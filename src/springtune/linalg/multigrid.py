@@ -3,8 +3,8 @@
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from functools import cached_property, lru_cache, partialmethod
+from typing import Any
 
 import numba
 import numpy as np
@@ -55,12 +55,8 @@ class IndefiniteError(NotPositiveError):
     """Conjugate gradients met a direction without stiffness."""
 
 
-class Level(NamedTuple):
-    """Smoother of a matrix, the next coarser grid, and room for two fields and the forces on the grid's nodes."""
-
-    smoother: Chunks
-    grid: Grid
-    room: tuple[np.ndarray, np.ndarray, np.ndarray]
+_Level = tuple[Chunks, Grid, tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Smoother of a matrix, the next coarser grid, and room for two fields and the forces on the grid's nodes."""
 
 
 class Multigrid:
@@ -87,7 +83,7 @@ class Multigrid:
         self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
         self._held, self._places, self._product = held, np.flatnonzero(~held), chunked(matrix)
         self.name = "multigrid"
-        self._levels: list[Level]
+        self._levels: list[_Level]
         self._coarsest: Any
         self._direct: Factor | None = None
         self._certain = False
@@ -109,7 +105,7 @@ class Multigrid:
                 coarse, chunks = galerkin(matrix, grid), smoother(matrix)
                 nodes = np.zeros((len(chunks.starts) - 1, grid.shape[0] * grid.shape[1], 2), np.float32)
                 fields = np.zeros((2, *grid.cells.shape), np.float32)
-                self._levels.append(Level(chunks, grid, (*fields, nodes)))
+                self._levels.append((chunks, grid, (*fields, nodes)))
                 matrix, grid = coarse, next_grid(grid.shape)
                 places = np.flatnonzero(matrix.diagonal[:, ::2])
             self._coarsest = places, cho_factor(dense(matrix)[np.ix_(places, places)])
@@ -211,13 +207,9 @@ class Multigrid:
         if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
             raise SingularError("a particle is free to move: its springs, if any, are in one line")
 
-    def step(self, right: np.ndarray) -> np.ndarray:
-        """Solve as accurately as a step of Newton's method needs."""
-        return self.solve(right, STEP_RESIDUAL)
+    step = partialmethod(solve, tolerance=STEP_RESIDUAL)  # as accurate as a step of Newton's method needs
 
-    def estimate(self, right: np.ndarray) -> np.ndarray:
-        """Solve to a percent."""
-        return self.solve(right, 1e-2)
+    estimate = partialmethod(solve, tolerance=1e-2)
 
     @cached_property
     def negative_pivots(self) -> int:
@@ -282,18 +274,14 @@ def chunked(matrix: Blocks, dtype: Any = float) -> Chunks:
     count = len(matrix.diagonal)
     chunks = CHUNKS if count >= CHUNKS * ROWS_PER_CHUNK else 1
     starts = np.linspace(0, count, chunks + 1).astype(np.int64)
-    rows, columns, blocks = np.empty(0, np.int64), matrix.columns, matrix.blocks.astype(dtype, copy=chunks > 1)
-    between = rows, rows, blocks[:0]
-    if chunks > 1:
-        ends = matrix.pointers[starts]
-        crossing = np.concatenate(
-            [begin + np.flatnonzero(columns[begin:end] >= stop) for begin, end, stop in zip(ends, ends[1:], starts[1:])]
-        )
-        rows = np.searchsorted(matrix.pointers, crossing, side="right") - 1
-        between = rows, columns[crossing].astype(np.int64), blocks[crossing]
-        # In their places are couplings of a row with itself, of nothing.
-        columns = columns.copy()
-        columns[crossing], blocks[crossing] = rows, 0
+    ends, columns, blocks = matrix.pointers[starts], matrix.columns.copy(), matrix.blocks.astype(dtype)
+    crossing = np.concatenate(
+        [begin + np.flatnonzero(columns[begin:end] >= stop) for begin, end, stop in zip(ends, ends[1:], starts[1:])]
+    )
+    rows = np.searchsorted(matrix.pointers, crossing, side="right") - 1
+    between = rows, columns[crossing].astype(np.int64), blocks[crossing]
+    # In their places are couplings of a row with itself, of nothing.
+    columns[crossing], blocks[crossing] = rows, 0
     nothing = rows[:0], np.empty((0, 2), dtype)
     return Chunks(starts, matrix.pointers, columns, blocks, matrix.diagonal, *between, *nothing)
 
@@ -323,16 +311,18 @@ def first_grid(points: np.ndarray, coarsening: float) -> Grid:
     """Regular grid over points (n_points, 2) [m], with a spacing of so many times their mean distance."""
     lowest, extent = points.min(axis=0), np.ptp(points, axis=0)
     spacing = coarsening * np.sqrt(extent.prod() / len(points))
-    count = np.maximum(1, np.round(extent / spacing)).astype(np.int32)
-    at = (points - lowest) / (extent / count)
-    cells = np.minimum(at.astype(np.int32), count - 1)
-    return Grid(cells, (at - cells).astype(np.float32), (int(count[0]) + 1, int(count[1]) + 1))
+    counts = np.maximum(1, np.round(extent / spacing)).astype(np.int32)
+    return _located((points - lowest) / (extent / counts), counts)
 
 
 def next_grid(shape: tuple[int, int]) -> Grid:
     """Grid of twice the spacing over the nodes of a regular one; a single row of cells stays one."""
     places = [np.arange(count) / (2.0 if count > 2 else 1.0) for count in shape]
-    sizes = [max(1, count // 2) for count in shape]
     at = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, 2)
-    cells = np.minimum(at.astype(np.int32), np.array(sizes, np.int32) - 1)
-    return Grid(cells, (at - cells).astype(np.float32), (sizes[0] + 1, sizes[1] + 1))
+    return _located(at, np.maximum(1, np.array(shape, np.int32) // 2))
+
+
+def _located(at: np.ndarray, counts: np.ndarray) -> Grid:
+    """Grid of so many cells along x and y, by places (n_points, 2) in units of a cell."""
+    cells = np.minimum(at.astype(np.int32), counts - 1)
+    return Grid(cells, (at - cells).astype(np.float32), (int(counts[0]) + 1, int(counts[1]) + 1))

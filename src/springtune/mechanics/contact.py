@@ -72,12 +72,10 @@ def oriented_outline(mesh: Mesh) -> np.ndarray:
 
 def neighbours(outline: np.ndarray) -> np.ndarray:
     """Edge after and edge before each edge of an outline, shape (2, n)."""
-    starts = np.empty(outline.max() + 1, dtype=int)
-    starts[outline[:, 0]] = np.arange(len(outline))
-    after = starts[outline[:, 1]]
-    before = np.empty(len(outline), dtype=int)
-    before[after] = np.arange(len(outline))
-    return np.stack([after, before])
+    leaving, arriving = np.argsort(outline, axis=0).T  # edges by their starts, and by their ends
+    found = np.empty((2, len(outline)), dtype=int)
+    found[0, arriving], found[1, leaving] = leaving, arriving
+    return found
 
 
 class Body:
@@ -364,7 +362,7 @@ class Contact:
         if self.friction:
             rubbing, stiffening, drag = self._friction(contacts, known)
             missing = [part + force for part, force in zip(missing, rubbing)]
-            more = [_sum(*pair) for pair in zip(more, stiffening)]
+            more = [rubbed if turned is None else turned + rubbed for turned, rubbed in zip(more, stiffening)]
         rows = self._rows(contacts, contacts.normals)
         try:
             tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
@@ -485,11 +483,6 @@ class Contact:
         outer = (contacts.owners < bodies) & ((contacts.targets < 0) | (contacts.targets >= bodies))
         inner = (contacts.owners >= bodies) & (contacts.targets >= 0)
         return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
-
-
-def _sum(first: csc_array | None, second: csc_array | None) -> csc_array | None:
-    """Sum of two matrices, either of which may be missing."""
-    return second if first is None else first + second
 
 
 def _near(others: np.ndarray, places: np.ndarray, reach: np.ndarray | float) -> np.ndarray:

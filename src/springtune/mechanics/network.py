@@ -89,7 +89,8 @@ class Network:
     """Particles joined by springs, with some directions held (n_points, 2).
 
     Springs run from particle `first` to `second`, with `rest_vectors` (n_springs, 2) and `rest_lengths` [m];
-    `stiffness` (n_springs,) is over the reference stiffness [1].
+    `stiffness` (n_springs,) is over the reference stiffness [1]. `unknowns` directions are free to move; `expand` and
+    `reduce` are those of its `Pattern`.
     """
 
     def __init__(
@@ -108,25 +109,12 @@ class Network:
         self.has_springs = bool(np.any(stiffness)) or not self.energies
         self._indefinite = False  # the last matrix that was factorized, a large one
         pattern = Pattern(mesh, held) if like is None else like._pattern
-        self._pattern: Pattern = pattern if pattern.mesh is mesh else pattern.moved(mesh)
+        pattern = pattern if pattern.mesh is mesh else pattern.moved(mesh)
+        self._pattern: Pattern = pattern
+        self.unknowns, self.expand, self.reduce = pattern.size, pattern.expand, pattern.reduce
         self.first, self.second = pattern.first, pattern.second
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths
-
-    # -- unknowns ---------------------------------------------------------------------------------------------------
-
-    @property
-    def unknowns(self) -> int:
-        """Number of directions that are free to move."""
-        return self._pattern.size
-
-    def expand(self, unknowns: np.ndarray) -> np.ndarray:
-        """Displacement of every particle [m], shape (n_points, 2), from the vector of unknowns."""
-        return self._pattern.expand(unknowns)
-
-    def reduce(self, vectors: np.ndarray) -> np.ndarray:
-        """Entries of a field of shape (n_points, 2) that belong to unknowns."""
-        return self._pattern.reduce(vectors)
 
     def end_differences(self, displacements: np.ndarray) -> np.ndarray:
         """Difference of the displacements of each spring's ends [m], shape (n_springs, 2)."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from ..linalg.factors import Analysis, nested_dissection, spread
+from ..linalg.factors import Analysis, entry_places, nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
 
@@ -208,14 +208,14 @@ class Pattern:
 
     def entries(self, particles: np.ndarray, matrices: np.ndarray) -> np.ndarray:
         """Entries of matrices of groups of joined particles, shape (n, 2 m, 2 m)."""
-        rows, columns = _places(self.number[particles])
+        rows, columns = entry_places(self.number[particles])
         kept = np.flatnonzero((rows >= 0) & (columns >= 0))
         places = np.searchsorted(self.codes, columns[kept] * self.size + rows[kept])
         return np.bincount(places, matrices.ravel()[kept], len(self.indices))
 
     def loose_entries(self, particles: np.ndarray, matrices: np.ndarray) -> csr_array:
         """Matrix over all directions (2 n_points, 2 n_points) of groups of particles, without those that are held."""
-        rows, columns = _places(2 * particles[:, :, None] + [0, 1])
+        rows, columns = entry_places(2 * particles[:, :, None] + [0, 1])
         free: np.ndarray = self.number.ravel() >= 0
         values = np.where(free[rows] & free[columns], matrices.ravel(), 0.0)
         return csr_array((values, (rows, columns)), shape=(self.number.size, self.number.size))
@@ -229,10 +229,3 @@ class Pattern:
     @cached_property
     def _empty(self) -> csc_array:
         return csc_array((np.zeros(len(self.indices)), self.indices, self.pointers), shape=(self.size, self.size))
-
-
-def _places(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns of the entries of matrices over numbers (n, m, 2), one matrix after another."""
-    local = numbers.reshape(len(numbers), -1)
-    width = local.shape[1]
-    return np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()

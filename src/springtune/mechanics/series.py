@@ -248,10 +248,9 @@ class StablePath:
 
     def _is_on_other_path(self, s: float) -> bool:
         """Return whether the series about rest now follows another, unstable path."""
-        network, displacements = self.problem.network, self._rest.at(s)[1]
-        missing = s * self.problem.load - network.free_forces_over_k(displacements)
-        near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
-        return near and not network.is_stable(displacements)
+        displacements = self._rest.at(s)[1]
+        near = self.problem.balance(s, displacements)[1] <= 1e-3
+        return near and not self.problem.network.is_stable(displacements)
 
     def _value_beyond(self, load: float) -> float:
         """Return the weighted displacement at a load beyond the series, or NaN off the stable path."""

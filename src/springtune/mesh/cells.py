@@ -346,9 +346,8 @@ def too_many(count: float, size: float, side: float, body: str) -> str:
         return ""
     least = 1.1 * size * math.sqrt(count / MOST_MESH_PARTICLES)
     remedy = f"at least {1e3 * least:.2g} mm" if least < side else f"a shorter {body.partition(' ')[0]}"
-    return (
-        f"makes some {count:.2g} particles of {body}, more than can be meshed ({MOST_MESH_PARTICLES:,}); give {remedy}"
-    )
+    made = f"makes some {count:.2g} particles of {body}"
+    return f"{made}, more than can be meshed ({MOST_MESH_PARTICLES:,}); give {remedy}"
 
 
 def nearest_whole(ratio: float) -> int:

@@ -16,6 +16,8 @@ from .cells import Mesh, MeshError, no_cells, signed_areas, upright
 from .sheets import COORDINATE_TOLERANCE, Content, GroupedMesh, box_fault, on_sides, outline_of, part_names, sheet_fault
 from .sides import in_words
 
+CELL_TYPES = {3: "triangle", 4: "quad"}  # meshio's names of cells by their number of corners
+
 CORNER_COUNTS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4}
 """Points of cells that are read and of those that make groups, by meshio's name."""
 
@@ -70,12 +72,10 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     # A named point that is no particle becomes a point of its own.
     places: list[np.ndarray] = []
     blocks: list[tuple[str, np.ndarray, str]] = []
-    labels = part_names(grouped)
-    for name, count in CORNER_COUNTS.items():
-        for part in ("", *grouped.parts) if count in labels else ():
-            mask = labels[count] == part
-            if mask.any():
-                blocks.append((name, mesh.cells[count][mask], part))
+    for count, labels in part_names(grouped).items():
+        for part in ("", *grouped.parts):
+            if (mask := labels == part).any():
+                blocks.append((CELL_TYPES[count], mesh.cells[count][mask], part))
     blocks += [("line", edges, side) for side, edges in grouped.sides.items()]
     for point, place in grouped.points.items():
         number = grouped.particle(point)

@@ -2,8 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from .cells import Mesh, MeshError, check_box, mesh_type, signed_areas, too_many, upright
 from .rows import ROW_HEIGHT
 from .sheets import GroupedMesh
-from .sides import OutlineSide, Point, nearer, winds_about
+from .sides import Point, Stretch, nearer, winds_about
 
 EDGE_FACTOR = 1.0 + 1e-9
 """Edge imposed on netgen, over the wanted one: a side of n edges exactly shall not be split into n + 1 by rounding."""
@@ -96,25 +95,6 @@ MOST_ROUNDS = 20  # most times that a mesh is made anew because netgen divided e
 Outlined = Any  # A `springtune.Shape`, which is of a room above
 
 
-@dataclass(frozen=True)
-class _Stretch:
-    """An edge-to-be of the outline: a stretch of a side."""
-
-    side: OutlineSide
-    low: float
-    high: float
-    inner: int
-    outer: int
-
-    def cut(self, parameters: Iterable[float]) -> list["_Stretch"]:
-        """Stretches between parameters, of which the first and the last are its ends."""
-        return [replace(self, low=low, high=high) for low, high in pairwise(parameters)]
-
-    def divided(self, count: int) -> list["_Stretch"]:
-        """Stretches of equal length."""
-        return self.cut(self.side.divided(count, self.low, self.high))
-
-
 def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
     """Mesh a shape by netgen; lengths in m. Same input, same mesh; see `springtune.mesh_shape`."""
     what = f"shape '{shape.name}'"
@@ -126,7 +106,7 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
         made, chains, divided = _netgen(shape, stretches, lines, fine, sizes)
         if not any(stretches[number].side.arc for number in divided):
             return _group_mesh(shape, made, chains, stretches)
-        again: list[_Stretch] = []
+        again: list[Stretch] = []
         for number, one in enumerate(stretches):
             again += one.cut([one.low, *(divided.get(number, ()) if one.side.arc else ()), one.high])
         stretches = again
@@ -166,7 +146,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
 Line = tuple[Point, Point, int]  # start and end of a line of one edge [m], and its region
 
 
-def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[_Stretch], list[Line], dict[Point, float]]:
+def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[Stretch], list[Line], dict[Point, float]]:
     """Stretches of the outlines, one for each edge; lines from points on none; and sizes at all named points."""
     small = 1e-9 * np.ptp(shape.extent, axis=0).max()
     inside = dict(shape.points)
@@ -176,29 +156,25 @@ def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[_St
         outer = 0 if one.around is None else 1 + one.around
         inner = 0 if one.inner is None else 1 + number
         for side in one.sides:
-            cuts = {0.0, 1.0}
             size = min(sizes.get(name, sizes[""]) for name in (side.group, one.inner or "", one.outer or ""))
-            for name, point in shape.points.items():
-                parameter, distance = side.nearest(point)
-                if distance <= small:
-                    inside.pop(name, None)
-                    parameter = next((end for end in (0.0, 1.0) if math.dist(point, side.at(end)) <= small), parameter)
-                    cuts.add(parameter)
-                    place = side.at(parameter)
-                    fine[place] = min(sizes.get(name, size), fine.get(place, size))
-            for begin, end in pairwise(sorted(cuts)):
+            on_it = side.find_on_it(shape.points, small)
+            for name, parameter in on_it.items():
+                inside.pop(name, None)
+                place = side.at(parameter)
+                fine[place] = min(sizes.get(name, size), fine.get(place, size))
+            for begin, end in pairwise(sorted({0.0, 1.0, *on_it.values()})):
                 # A hair less: a side of exactly n edges shall not be split into n + 1 by rounding.
                 count = math.ceil((side.length_to(end) - side.length_to(begin)) / size * (1 - 1e-9))
                 if side.arc:
                     turn = abs(side.arc[3]) * (end - begin)
                     count = max(count, math.ceil(LEAST_EDGES_A_TURN * turn / (2 * math.pi) * (1 - 1e-9)))
-                stretches += _Stretch(side, begin, end, inner, outer).divided(max(count, 1))
+                stretches += Stretch(side, begin, end, inner, outer).divided(max(count, 1))
     fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
     lines = _lines(shape, {point: fine[point] for point in inside.values()})
     return _separate_chords(stretches, shape.name), lines, fine
 
 
-def _separate_chords(stretches: list[_Stretch], name: str) -> list[_Stretch]:
+def _separate_chords(stretches: list[Stretch], name: str) -> list[Stretch]:
     """Stretches of arcs halved until their chords are well apart from other ones: walls may be thin."""
     for _ in range(MOST_ROUNDS):
         numbers: dict[Point, int] = {}
@@ -237,7 +213,7 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[Line]:
 
 def _netgen(
     shape: Outlined,
-    stretches: Sequence[_Stretch],
+    stretches: Sequence[Stretch],
     lines: Sequence[Line],
     fine: Mapping[Point, float],
     sizes: Mapping[str, float],
@@ -252,7 +228,7 @@ def _netgen(
     pairs += [(start, end) for start, end, _ in lines]
     numbers = {point: number for number, point in enumerate(dict.fromkeys(point for pair in pairs for point in pair))}
     joined = [(numbers[start], numbers[end]) for start, end in pairs]
-    domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for _, _, region in lines]
+    domains = [(stretch.left, stretch.right) for stretch in stretches] + [(region, region) for _, _, region in lines]
     given, parts = (np.array(list(numbers)) - origin) / unit, enumerate((one.inner for one in shape.rounds), 1)
     made = triangulate(
         given,
@@ -295,19 +271,19 @@ def _netgen(
 
 
 def _group_mesh(
-    shape: Outlined, made: Triangulation, chains: list[list[int]], stretches: Sequence[_Stretch]
+    shape: Outlined, made: Triangulation, chains: list[list[int]], stretches: Sequence[Stretch]
 ) -> GroupedMesh:
     """A mesh with the groups of its shape, refused where triangles do not fill the outline."""
     # About a corner: coordinates far from the origin would cost digits.
     ends = made.points[[pair for one in chains for pair in pairwise(one)]] - made.points[0]
-    senses = [bool(one.inner) - bool(one.outer) for one, chain in zip(stretches, chains) for _ in chain[1:]]
+    senses = [bool(one.left) - bool(one.right) for one, chain in zip(stretches, chains) for _ in chain[1:]]
     within = 0.5 * float((ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 1, 0] * ends[:, 0, 1]) @ senses)
     if abs(np.abs(signed_areas(made.points, made.triangles)).sum() - within) > 1e-9 * within:
         raise MeshError(f"netgen does not fill shape '{shape.name}'; give another size")
     sides: dict[str, list[Any]] = defaultdict(list)
     for stretch, points in zip(stretches, chains):
         if stretch.side.group:
-            sides[stretch.side.group] += [pair if stretch.inner else pair[::-1] for pair in pairwise(points)]
+            sides[stretch.side.group] += [pair if stretch.left else pair[::-1] for pair in pairwise(points)]
     parts: dict[str, np.ndarray] = {}
     for number, one in enumerate(shape.rounds, 1):
         if one.inner:

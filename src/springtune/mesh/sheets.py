@@ -139,16 +139,16 @@ def box_fault(mesh: Mesh) -> str:
     >>> box_fault(Mesh(whole.points, whole.triangles[1:]))[:43]
     'its cells cover 99.375 % of the box or over'
     """
-    if "_box_fault" not in vars(mesh):
+    known = vars(mesh)
+    if "_box_fault" not in known:
         low = mesh.points.min(axis=0)
         box = mesh.points.max(axis=0) - low
         moved = replace(mesh, points=mesh.points - low) if low.any() else mesh
         try:
-            fault = _box_filling_fault(on_sides(moved, box), box)
+            known["_box_fault"] = _box_filling_fault(on_sides(moved, box), box)
         except MeshError as error:
-            fault = str(error)
-        vars(mesh)["_box_fault"] = fault
-    return str(vars(mesh)["_box_fault"])
+            known["_box_fault"] = str(error)
+    return str(known["_box_fault"])
 
 
 def _box_filling_fault(mesh: Mesh, box: np.ndarray) -> str:

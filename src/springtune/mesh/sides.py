@@ -1,9 +1,11 @@
 """Sides of an outline, straight or arcs, and edges: points, lengths, distances, windings and intersections."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
@@ -218,6 +220,35 @@ class OutlineSide:
         parameter = min((0.0, 1.0, 0.5 * (low + high)), key=lambda one: math.dist(self.at(one), point))
         return parameter, math.dist(self.at(parameter), point)
 
+    def find_on_it(self, points: Mapping[str, Point], small: float) -> dict[str, float]:
+        """Return parameters of the named points within a distance `small` [m]; 0 or 1 near an end."""
+        found = {}
+        for name, point in points.items():
+            parameter, distance = self.nearest(point)
+            if distance <= small:
+                near = (end for end in (0.0, 1.0) if math.dist(point, self.at(end)) <= small)
+                found[name] = next(near, parameter)
+        return found
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Side between two parameters, and numbers of the regions on its left and right."""
+
+    side: OutlineSide
+    low: float
+    high: float
+    left: int
+    right: int
+
+    def cut(self, parameters: Iterable[float]) -> list[Self]:
+        """Stretches between parameters, of which the first and the last are its ends."""
+        return [replace(self, low=low, high=high) for low, high in pairwise(parameters)]
+
+    def divided(self, count: int) -> list[Self]:
+        """Stretches of equal length."""
+        return self.cut(self.side.divided(count, self.low, self.high))
+
 
 @dataclass(frozen=True)
 class Round:
@@ -257,9 +288,7 @@ def polygon(sides: tuple[OutlineSide, ...]) -> tuple[np.ndarray, np.ndarray]:
     error = CHORD_ERROR * math.dist(*extent(sides))
     points, numbers = [], []
     for number, side in enumerate(sides):
-        count = 1
-        if side.arc is not None:
-            count = math.ceil(abs(side.arc[3]) * math.sqrt(max(side.arc[:2]) / (8 * error)))
+        count = math.ceil(abs(side.arc[3]) * math.sqrt(max(side.arc[:2]) / (8 * error))) if side.arc else 1
         points += [side.at(i / count) for i in range(count)]
         numbers += [number] * count
     return np.array(points), np.array(numbers)

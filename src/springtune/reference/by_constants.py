@@ -10,7 +10,7 @@ from copy import copy
 import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array, kron
 
-from ..linalg.factors import factorize
+from ..linalg.factors import entry_places, factorize
 from ..mesh.sheets import GroupedMesh
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Shape
@@ -35,8 +35,7 @@ class Family:
         self._free, self.forces, self._given = ~level.held.ravel(), level.forces().ravel(), level.supports()[1].ravel()
         sides = [group for side in mesh.sides.values() for group in side.groups]
         self.groups = (*dict.fromkeys(sides), *level.problem.points)
-        numbers = (2 * space.numbers[:, :, None] + np.arange(2)).reshape(len(space.corners), -1)
-        places = np.repeat(numbers, numbers.shape[1], axis=1).ravel(), np.tile(numbers, numbers.shape[1]).ravel()
+        places = entry_places(2 * space.numbers[:, :, None] + np.arange(2))
         self._all = []
         for part in map(mesh.names.index, materials):
             for row, column in ENTRIES:

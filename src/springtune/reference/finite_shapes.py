@@ -106,7 +106,7 @@ class _FiniteLevel(Level, Body):
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Return coefficients and residual forces, shape (n_functions, 2), and the strain energy."""
         problem, space = self.problem, self.space
-        _, weights, _, gradients = tabulated(space.degree, 2 * space.degree + (4 if space.curved.any() else 0))
+        weights, _, gradients = tabulated(space.degree, 2 * space.degree + (4 if space.curved.any() else 0))
         jacobian, determinant = space.jacobians(gradients)
         self.law = law = self._laws(space.mesh.parts)
         self.nodes_of = space.numbers
@@ -185,11 +185,8 @@ class _FiniteLevel(Level, Body):
 
     def _area_growth(self) -> np.ndarray:
         """Growth of the areas of quadrature points [m2]."""
-        space = self.space
-        _, weights, _, gradients = tabulated(space.degree, 2 * space.degree)
-        slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
-        of_map = np.linalg.det(space.jacobians(gradients)[0])
-        return super()._area_growth() + np.linalg.det(slopes) * np.sign(of_map) * weights
+        slopes, _, determinant, weights = self._at_quadrature(2 * self.space.degree)
+        return super()._area_growth() + np.linalg.det(slopes) * np.sign(determinant) * weights
 
     def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Forces over lengths as they are now and the thickness at rest [Pa], shape (n, 3)."""

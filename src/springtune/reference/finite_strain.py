@@ -23,7 +23,7 @@ from scipy.interpolate import krogh_interpolate
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
-from ..linalg.factors import SingularError, SuperLUFactor
+from ..linalg.factors import SingularError, SuperLUFactor, entry_places
 from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
 from ..problem.materials import Material, Rubber
 from ..problem.shapes import Beam
@@ -237,15 +237,12 @@ class Body:
         stretched = np.swapaxes(held, 1, 2) @ turned.reshape(count, 2 * points, shapes)
         for axis in range(2):
             blocks[:, axis::2, axis::2] += stretched
-        rows, columns = self._places
-        return csr_array((blocks.ravel(), (rows, columns)), shape=(self.load.size, self.load.size))
+        return csr_array((blocks.ravel(), self._places), shape=(self.load.size, self.load.size))
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of the entries of all elements' matrices."""
-        unknowns = (2 * self.nodes_of[:, :, None] + np.arange(2)).reshape(len(self.nodes_of), -1)
-        count = unknowns.shape[1]
-        return np.repeat(unknowns, count, axis=1).ravel(), np.tile(unknowns, count).ravel()
+        return entry_places(2 * self.nodes_of[:, :, None] + np.arange(2))
 
     def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
         """Relative change of the load's displacement by the last step."""

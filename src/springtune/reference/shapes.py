@@ -26,6 +26,7 @@ from .triangles import (
     is_unfolded,
     outline_mesh,
     shape_functions,
+    side_functions,
     tabulated,
 )
 
@@ -93,8 +94,7 @@ class ShapeReference:
 
     def scaled(self, factor: float) -> "ShapeReference":
         """The solution under so many times the load, prescribed displacements included: small strain is linear."""
-        powers = {name: 2 if self._kinds[name] == "energy" else 1 for name in self.values}
-        values = {name: value * factor ** powers[name] for name, value in self.values.items()}
+        values = {name: one * factor ** (1 + (self._kinds[name] == "energy")) for name, one in self.values.items()}
         by = {"energy": factor**2, "rotation": abs(factor), "strain": abs(factor), "_factor": factor}
         return replace(self, values=values, **{name: getattr(self, name) * one for name, one in by.items()})
 
@@ -216,10 +216,9 @@ class Problem:
         self, shape: Shape, load: LoadCase, materials: Mapping[str, AnyMaterial], grouped: GroupedMesh | None
     ) -> None:
         self.shape, self.load = shape, load
-        self.points = {name: np.array(point, dtype=float) for name, point in shape.points.items()}
-        if grouped is not None:
-            self.points |= {name: np.array(point, dtype=float) for name, point in grouped.points.items()}
-        elif not shape.outline:
+        points = {**shape.points, **(grouped.points if grouped else {})}
+        self.points = {name: np.array(point, dtype=float) for name, point in points.items()}
+        if grouped is None and not shape.outline:
             raise ValueError(f"shape {shape.name!r} has no outline; give the mesh of its file")
         used = ({one.group for one in load.supports} | {one.group for one in load.tractions}) & set(self.points)
         # Small triangles where something is asked for: values at points are the last to converge.
@@ -294,33 +293,34 @@ class Problem:
         self.kinds = {quantity.name: quantity.kind for quantity in load.quantities} | {"": "energy"}
         self._quantities = {quantity.name: quantity for quantity in load.quantities}
         for quantity in load.quantities:
-            self._check(quantity)
+            if why := self._objection(quantity):
+                raise ValueError(f"quantity {quantity.name!r}: {why}")
         self._graded = self.mesh.copy()
         self._graded.isolate(self.rough)
         self._layers = 0
 
-    def _check(self, quantity: Quantity) -> None:
-        name, kind, of = quantity.name, quantity.kind, quantity.of
+    def _objection(self, quantity: Quantity) -> str:
+        """Why a quantity has no value in a continuum, with the remedy, or an empty string."""
+        kind, of = quantity.kind, quantity.of
         corner = self.corners.get(self.mesh.named.get(of, -1)) if kind == "stress" else None
         if corner and corner.infinite:
             remedy = "ask for it beside the corner"
             if not self.shape.outline:
                 remedy += ", or give the shape as an outline with arcs rather than as a mesh"
-            why = f"the stress at {of!r} is infinite in a continuum, since {corner.what} there"
-            raise ValueError(f"quantity {name!r}: {why}: {remedy}")
+            return f"the stress at {of!r} is infinite in a continuum, since {corner.what} there: {remedy}"
         if kind == "stress":
             beside = self.mesh.parts[(self.mesh.triangles == self.mesh.named[of]).any(axis=1)]
             if len(set(beside.tolist())) > 1:
-                why = f"{of!r} is where parts of different materials meet, and the stress has a jump there"
-                raise ValueError(f"quantity {name!r}: {why}: ask for it on one side")
+                where = f"{of!r} is where parts of different materials meet"
+                return f"{where}, and the stress has a jump there: ask for it on one side"
         for point in self.loaded_points if kind in ("displacement", "stress") and of in self.points else ():
             if np.allclose(self.points[point], self.points[of], rtol=0, atol=1e-9 * np.ptp(self.mesh.points)):
                 why = f"the {kind} under a point force is infinite in a continuum"
-                raise ValueError(f"quantity {name!r}: {why}: spread the force on {point!r} over a side")
+                return f"{why}: spread the force on {point!r} over a side"
         if kind == "energy" and self.infinite_energy:
-            why = "the energy of a point force is infinite in a continuum"
             points = ", ".join(sorted(self.loaded_points))
-            raise ValueError(f"quantity {name!r}: {why}: spread the force on {points} over a side")
+            return f"the energy of a point force is infinite in a continuum: spread the force on {points} over a side"
+        return ""
 
     def note_reactions(self, level: "Level") -> None:
         """Note point supports that carry a force: a continuum's displacements and energy are infinite there."""
@@ -394,7 +394,7 @@ class Level:
         result = np.empty((n, count, 2, count, 2))
         tensors = self._tensor[space.mesh.parts]
         straight = np.flatnonzero(~space.curved)
-        _, weights, _, gradients = tabulated(degree, 2 * degree - 2)
+        weights, _, gradients = tabulated(degree, 2 * degree - 2)
         jacobian, determinant = space.jacobians(gradients[:1], straight)
         inverse = inverse_of(jacobian[:, 0], determinant[:, 0])
         products = np.einsum("q,qia,qjb->abij", weights, gradients, gradients, optimize=True)
@@ -403,7 +403,7 @@ class Level:
         blocks = metric.reshape(-1, 4) @ products.reshape(4, -1)
         result[straight] = blocks.reshape(len(straight), 2, 2, count, count).transpose(0, 3, 1, 4, 2)
         curved = np.flatnonzero(space.curved)
-        _, weights, _, gradients = tabulated(degree, 2 * degree + 4)
+        weights, _, gradients = tabulated(degree, 2 * degree + 4)
         for rows in np.array_split(curved, max(1, len(curved) * gradients.size // 4_000_000)) if len(curved) else ():
             jacobian, determinant = space.jacobians(gradients, rows)
             inverse = inverse_of(jacobian, determinant)
@@ -423,12 +423,16 @@ class Level:
 
     def integral(self, group: str, given: Field) -> np.ndarray:
         """Integral over a group of the functions times vectors."""
-        total = np.zeros((self.space.n_functions, 2))
+        space, total = self.space, np.zeros((self.space.n_functions, 2))
+        along, weights = np.polynomial.legendre.leggauss(space.degree + 3)
+        values, slopes = side_functions(space.degree, along)
         for ends, sense in self.group_sides(group):
-            values, points, normals, weights = self.space.side_points(ends, sense, self.space.degree + 3)
+            functions = space.on_side(ends)
+            at = space.places[functions]
+            normals = sense * (slopes @ at)[:, ::-1] * [1, -1]
             lengths = np.linalg.norm(normals, axis=1)
-            vectors = given(points, normals / lengths[:, None])
-            total[self.space.on_side(ends)] += values.T @ (vectors * (weights * lengths)[:, None])
+            vectors = given(values @ at, normals / lengths[:, None])
+            total[functions] += values.T @ (vectors * (weights * lengths)[:, None])
         return total
 
     def _shares(self, group: str) -> np.ndarray:
@@ -450,7 +454,7 @@ class Level:
         for pressure in load.pressures:
             total -= pressure.pressure * thickness * self.integral(pressure.group, lambda _, normals: normals)
         if any(load.gravity):
-            _, weights, values, gradients = tabulated(space.degree, 3 * space.degree)
+            weights, values, gradients = tabulated(space.degree, 3 * space.degree)
             volume = weights * np.abs(space.jacobians(gradients)[1])
             shares = (volume @ values) * (thickness * problem.density[space.mesh.parts])[:, None]
             by_function = np.bincount(space.numbers.ravel(), shares.ravel(), space.n_functions)
@@ -560,12 +564,15 @@ class Level:
         corners = np.unique([ends for ends, _ in self.group_sides(group)])
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
+    def _at_quadrature(self, exact: int) -> tuple[np.ndarray, ...]:
+        """Displacements' slopes by reference coordinates, derivatives and determinants of the map, and weights."""
+        weights, _, gradients = tabulated(self.space.degree, exact)
+        slopes = np.einsum("eic,qiu->eqcu", self.field[self.space.numbers], gradients, optimize=True)
+        return slopes, *self.space.jacobians(gradients), weights
+
     def _area_growth(self) -> np.ndarray:
         """Divergence of the displacements times the areas of quadrature points [m2]."""
-        space = self.space
-        _, weights, _, gradients = tabulated(space.degree, 2 * space.degree)
-        jacobian, determinant = space.jacobians(gradients)
-        slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
+        slopes, jacobian, determinant, weights = self._at_quadrature(2 * self.space.degree)
         # The determinant cancels: cofactors of the map, with its sense.
         by_x = slopes[..., 0, 0] * jacobian[..., 1, 1] - slopes[..., 0, 1] * jacobian[..., 1, 0]
         by_y = slopes[..., 1, 1] * jacobian[..., 0, 0] - slopes[..., 1, 0] * jacobian[..., 0, 1]
@@ -589,10 +596,7 @@ class Level:
 
     def rotation_and_strain(self) -> tuple[float, float]:
         """Rotation [rad] and strain [1] by which the solution is judged."""
-        space = self.space
-        _, weights, _, gradients = tabulated(space.degree, 4)
-        jacobian, determinant = space.jacobians(gradients)
-        slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
+        slopes, jacobian, determinant, weights = self._at_quadrature(4)
         slopes = slopes @ inverse_of(jacobian, determinant)
         return most_rotation_and_strain(slopes.reshape(-1, 2, 2), (weights * np.abs(determinant)).ravel())
 

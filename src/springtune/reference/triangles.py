@@ -20,7 +20,7 @@ from scipy import spatial
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.free import triangulate
 from ..mesh.sheets import GroupedMesh, part_names
-from ..mesh.sides import OutlineSide, Point, turn
+from ..mesh.sides import OutlineSide, Point, Stretch, turn
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
@@ -203,26 +203,19 @@ def _points(side: OutlineSide, span: tuple[float, float], shares: np.ndarray) ->
 
 
 @dataclass(frozen=True)
-class _Piece:
-    """A stretch of the outline that becomes a side of triangles, or some; numbers of the regions beside it."""
+class _Piece(Stretch):
+    """A stretch of the outline that becomes a side of triangles, or some."""
 
-    side: OutlineSide
-    span: tuple[float, float]
     groups: tuple[str, ...]
-    left: int
-    right: int
 
     def at(self, shares: np.ndarray) -> np.ndarray:
-        return _points(self.side, self.span, shares)
+        return _points(self.side, (self.low, self.high), shares)
 
     @property
     def turn(self) -> float:
         """Turn of its direction from end to end [rad]."""
-        one, other = (self.side.slope(parameter) for parameter in self.span)
+        one, other = self.side.slope(self.low), self.side.slope(self.high)
         return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
-
-    def cut(self, parameters: list[float]) -> "list[_Piece]":
-        return [replace(self, span=span) for span in zip(parameters, parameters[1:])]
 
 
 def _refine_pieces(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
@@ -244,23 +237,10 @@ def _refine_pieces(pieces: list[_Piece], extent: float, largest_turn: float) -> 
             others = (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf)
             limit = min(extent / LEAST_SIDES_ALONG, ELEMENT_GROWTH * nearest, others)
             kept = length <= 1.01 * limit and piece.turn <= 1.01 * largest_turn and sagitta <= LARGEST_SAGITTA * nearest
-            start, end = piece.span
-            refined += piece.cut([start, end] if kept else [start, (start + end) / 2, end])
+            refined += [piece] if kept else piece.cut([piece.low, (piece.low + piece.high) / 2, piece.high])
         if len(refined) == len(pieces):
             return pieces
         pieces = refined
-
-
-def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:
-    """Parameters of the ends of a side and of points on it, and the names of these."""
-    cuts, on_it = {0.0, 1.0}, []
-    for name, point in points.items():
-        parameter, distance = side.nearest(point)
-        if distance <= small:
-            on_it.append(name)
-            if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > small:
-                cuts.add(parameter)
-    return sorted(cuts), on_it
 
 
 def outline_mesh(
@@ -271,7 +251,7 @@ def outline_mesh(
         names = ("", *shape.parts)
         numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
         whole = [
-            _Piece(side, (0.0, 1.0), (side.group,) if side.group else (), numbers[one.inner], numbers[one.outer])
+            _Piece(side, 0.0, 1.0, numbers[one.inner], numbers[one.outer], (side.group,) if side.group else ())
             for one in shape.rounds
             for side in one.sides
         ]
@@ -279,11 +259,12 @@ def outline_mesh(
         names, whole = _polygons(grouped)
     corners = np.array([end for piece in whole for end in (piece.side.start, piece.side.end)])
     extent = float(np.ptp(corners, axis=0).max())
-    pieces, placed = [], set()
+    pieces: list[_Piece] = []
+    placed: set[str] = set()
     for piece in whole:
-        cuts, on_it = _cut(piece.side, points, LENGTH_TOLERANCE * extent)
+        on_it = piece.side.find_on_it(points, LENGTH_TOLERANCE * extent)
         placed.update(on_it)
-        pieces += piece.cut(cuts)
+        pieces += piece.cut(sorted({0.0, 1.0, *on_it.values()}))
     mesh = _triangulated(shape.name, _refine_pieces(pieces, extent, largest_turn), names, extent)
     for name, point in points.items():
         where = np.array(point, dtype=float)
@@ -318,7 +299,7 @@ def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], exten
         shares[np.abs(shares) < 1e-7] = 0.0
         shares[np.abs(shares - 1) < 1e-7] = 1.0
         exact[[first, second]] = piece.at(shares)
-        span = piece.span[0] + shares * (piece.span[1] - piece.span[0])
+        span = piece.low + shares * (piece.high - piece.low)
         arc = piece.side if piece.side.arc else None
         sides[first, second] = Side(piece.groups, arc, (float(span[0]), float(span[1])))
     return CoarseMesh(exact, triangles, parts, names, sides, {})
@@ -339,11 +320,11 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
             groups[first, second] = (*groups.get((first, second), ()), name)
     leaving: dict[int, list[_Ends]] = {}
     arriving: dict[int, list[_Ends]] = {}
-    keys: dict[_Ends, tuple[tuple[str, ...], int, int]] = {}  # what is beside a way
+    keys: dict[_Ends, tuple[int, int, tuple[str, ...]]] = {}  # what is beside a way
     for (first, second), part in part_of.items():
         other = part_of.get((second, first), -1)
         if other < 0 or part < other:
-            keys[first, second] = groups.get((min(first, second), max(first, second)), ()), part + 1, other + 1
+            keys[first, second] = part + 1, other + 1, groups.get((min(first, second), max(first, second)), ())
             leaving.setdefault(first, []).append((first, second))
             arriving.setdefault(second, []).append((first, second))
     following: dict[_Ends, _Ends] = {}  # where a way goes on straight
@@ -359,7 +340,7 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
         while last in following:
             last = following[last]
         start, end = (tuple(mesh.points[point].tolist()) for point in (way[0], last[1]))
-        pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *keys[way]))
+        pieces.append(_Piece(OutlineSide(start, end), 0.0, 1.0, *keys[way]))
     return names, pieces
 
 
@@ -503,20 +484,16 @@ def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 @lru_cache(maxsize=64)
-def triangle_rule(exact: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (n, 2) and weights, sum 1/2, by Gauss's rules in a square folded onto the reference triangle."""
+def tabulated(degree: int, exact: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return quadrature weights, sum 1/2, exact to degree `exact`, and shape functions and gradients at its points.
+
+    Gauss's rules in a square are folded onto the reference triangle.
+    """
     nodes, weights = leggauss(exact // 2 + 1)
     across, weights_across = leggauss((exact + 1) // 2 + 1)  # one degree more by the fold
     x, y = (nodes + 1) / 2, (across + 1) / 2
     points = np.stack([np.multiply.outer(1 - y, x).ravel(), np.repeat(y, len(x))], axis=1)
-    return points, np.multiply.outer(weights_across / 2 * (1 - y), weights / 2).ravel()
-
-
-@lru_cache(maxsize=64)
-def tabulated(degree: int, exact: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return quadrature points and weights, exact to degree `exact`, and shape functions and gradients there."""
-    points, weights = triangle_rule(exact)
-    return points, weights, *shape_functions(degree, points)
+    return np.multiply.outer(weights_across / 2 * (1 - y), weights / 2).ravel(), *shape_functions(degree, points)
 
 
 @lru_cache(maxsize=64)
@@ -579,14 +556,6 @@ class Space:
             raise MeshError(f"a triangle folds along an arc near ({x:.4g}, {y:.4g}) mm; give the arc as shorter arcs")
         return derivatives, determinants
 
-    def side_points(self, ends: tuple[int, int], outwards: float, count: int) -> tuple[np.ndarray, ...]:
-        """Functions, points, outward normals times length, and weights at Gauss points of a side."""
-        along, weights = np.polynomial.legendre.leggauss(count)
-        values, slopes = side_functions(self.degree, along)
-        at = self.places[self.on_side(ends)]
-        tangents = slopes @ at
-        return values, values @ at, outwards * np.stack([tangents[:, 1], -tangents[:, 0]], axis=1), weights
-
 
 def inverse_of(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
     """Inverses of 2 x 2 matrices, shape (..., 2, 2)."""
@@ -603,7 +572,7 @@ def is_unfolded(mesh: CoarseMesh) -> bool:
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
     try:
         for degree in (2, 4):
-            gradients = tabulated(degree, 10)[3], shape_functions(degree, corners)[1]
+            gradients = tabulated(degree, 10)[2], shape_functions(degree, corners)[1]
             Space(mesh, degree).jacobians(np.concatenate(gradients))
     except MeshError:
         return False
