@@ -36,13 +36,11 @@ def end_quietly(number: int, frame: object) -> None:
 
 
 class Display:
-    """Progress of a run until `stop`; `counts` has the number of jobs of each rule."""
+    """Progress of a run until `over` is set; `counts` has the number of jobs of each rule."""
 
-    def __init__(
-        self, counts: Mapping[str, int], stream: TextIO, moves: bool, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self.counts, self.stream, self.moves, self.clock = counts, stream, moves, clock
-        self.begun, self.over, self.writing = clock(), threading.Event(), threading.Lock()
+    def __init__(self, counts: Mapping[str, int], stream: TextIO, moves: bool) -> None:
+        self.counts, self.stream, self.moves = counts, stream, moves
+        self.begun, self.over, self.writing = time.monotonic(), threading.Event(), threading.Lock()
         self.rules, self.jobs = dict[int, str](), {event: set[int]() for event in NUMBERS}
         if moves:
             threading.Thread(target=self._move, daemon=True).start()
@@ -56,23 +54,18 @@ class Display:
         if event == LogEvent.JOB_FINISHED and not self.moves:
             rule = self.rules.get(number, "")
             if sum(self.rules.get(one) == rule for one in self.jobs[event]) == self.counts.get(rule):
-                self._write(f"{rule}: done; {self.line()}\n")
+                self.write(f"{rule}: done; {self.line()}\n")
 
-    def write_above(self, write: Callable[[], None]) -> None:
-        """Write something else above the moving line."""
+    def write(self, text: str = "", above: Callable[[], object] = lambda: None) -> None:
+        """Write a text; without one remove the moving line, and write something else above it."""
         with self.writing:
-            if self.moves:
-                self.stream.write(LINE.format(""))
-            write()
-
-    def stop(self) -> None:
-        """Stop, and remove the moving line."""
-        self.over.set()
-        self.write_above(self.stream.flush)
+            self.stream.write(text or LINE.format("") * self.moves)
+            above()
+            self.stream.flush()
 
     def line(self) -> str:
         """Numbers of jobs, elapsed and remaining time, and the rules of running jobs."""
-        gone, count = self.clock() - self.begun, self.counts["total"]
+        gone, count = time.monotonic() - self.begun, self.counts["total"]
         running, done, failed = self.jobs.values()
         left = f", about {clock_text(gone * (count - len(done)) / len(done))} left" if 0 < len(done) < count else ""
         lost = f", {len(failed)} failed" if failed else ""
@@ -82,13 +75,8 @@ class Display:
 
     def _move(self) -> None:
         while not self.over.is_set():
-            self._write(LINE.format(self.line()))
+            self.write(LINE.format(self.line()))
             self.over.wait(PAUSE)
-
-    def _write(self, text: str) -> None:
-        with self.writing:
-            self.stream.write(text)
-            self.stream.flush()
 
 
 class LogHandler(LogHandlerBase):
@@ -107,16 +95,36 @@ class LogHandler(LogHandlerBase):
         self.display: Display | None = None
         self.held: list[LogRecord] = []
         asked = self.common_settings
-        quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()}
-        otherwise = asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag
-        self.wanted = not otherwise and not quiet & {"all", "progress", "rules"}
+        quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()} & {"all", "progress", "rules"}
+        self.wanted = not (quiet or asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag)
         if self.wanted and threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, end_quietly)
 
     def emit(self, record: LogRecord) -> None:
         """Show a record."""
         try:
-            self._show(record)
+            event = getattr(record, "event", None)
+            if not self.wanted:
+                self.plain.emit(record)
+            elif event == LogEvent.RUN_INFO and self.display is None:
+                self.held.clear()
+                stream, counts = sys.stderr, vars(record)["stats"]
+                moves = stream.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
+                stream.write(f"{counts['total']} jobs\n")
+                self.display = Display(counts, stream, moves)
+            elif getattr(record, "ends", False):
+                self.wanted = False  # what Snakemake says after it is shown
+                self._stop()
+                sys.stderr.write(f"{record.getMessage()}\n")
+            elif self.display is None:
+                self.held.append(record)
+                if record.levelno >= WARNING:  # an error before the run
+                    self._stop()
+            else:
+                if event in NUMBERS:
+                    self.display.record_event(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
+                if record.levelno >= WARNING:
+                    self.display.write(above=lambda: self.plain.emit(record))
         except Exception:
             # If the display fails, the messages of the run must still appear.
             self.wanted = False
@@ -128,38 +136,14 @@ class LogHandler(LogHandlerBase):
         self._stop()
         super().close()
 
-    def _show(self, record: LogRecord) -> None:
-        event = getattr(record, "event", None)
-        if not self.wanted:
-            self.plain.emit(record)
-        elif event == LogEvent.RUN_INFO and self.display is None:
-            self.held.clear()
-            stream, counts = sys.stderr, vars(record)["stats"]
-            moves = stream.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
-            stream.write(f"{counts['total']} jobs\n")
-            self.display = Display(counts, stream, moves)
-        elif getattr(record, "ends", False):
-            self.wanted = False  # what Snakemake says after it is shown
-            self._stop()
-            sys.stderr.write(f"{record.getMessage()}\n")
-        elif self.display is None:
-            self.held.append(record)
-            if record.levelno >= WARNING:  # an error before the run
-                self._stop()
-        else:
-            if event in NUMBERS:
-                self.display.record_event(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
-            if record.levelno >= WARNING:
-                self.display.write_above(lambda: self.plain.emit(record))
-
     def _stop(self) -> None:
         """Remove the display, and write held-back records."""
         if self.display is not None:
-            self.display.stop()
+            self.display.over.set()
+            self.display.write()
             self.display = None
-        held, self.held = self.held, []
-        for record in held:
-            self.plain.emit(record)
+        while self.held:
+            self.plain.emit(self.held.pop(0))
 
     @cached_property
     def plain(self) -> Handler:

@@ -232,10 +232,11 @@ class TestHandler(TestLogHandlerBase):
         assert made.getvalue().count("Select jobs to execute...") == 3
 
 
-def test_what_is_left_follows_the_rate_so_far():
+def test_what_is_left_follows_the_rate_so_far(monkeypatch):
     now = [1000.0]
-    display = Display({"a": 1, "b": 2, "total": 3}, io.StringIO(), True, clock=lambda: now[0])
-    display.stop()
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    display = Display({"a": 1, "b": 2, "total": 3}, io.StringIO(), True)
+    display.over.set()
     display.record_event(LogEvent.JOB_INFO, 1, "a")
     now[0] += 60
     assert display.line() == "0 of 3 jobs, 1:00 min: a"
