@@ -9,7 +9,7 @@ import pytest
 
 import springtune as st
 from springtune.studies.kinds.bodies import kind as bodies
-from springtune.studies.kinds.bodies.tables import like_with_like
+from springtune.studies.kinds.bodies.tables import own_references
 from springtune.studies.kinds.moduli.figures import tables
 from springtune.studies.runs.keys import inputs
 
@@ -83,7 +83,7 @@ def test_networks_are_compared_with_the_law_of_their_material(here):
     assert any("'yeoh-plane-stress'" in one for one in said) and any("neo-Hookean" in one for one in said)
     comment = root.material_young_modulus.attrs["comment"]
     assert comment.startswith("tested: Yeoh's law of 167394, ") and "7.4 % (uniaxial), 7 % (pure shear)" in comment
-    shown = like_with_like(tree).deformation_error.squeeze()
+    shown = own_references(tree).deformation_error.squeeze()
     for material, reference in own.items():
         exact = error.sel(material=material, reference=reference).values
         assert np.array_equal(shown.sel(material=material).values, exact, equal_nan=True)

@@ -5,7 +5,6 @@ import json
 import re
 import zlib
 
-import h5netcdf
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -81,10 +80,10 @@ class TestPage:
         assert "labels" not in groups["/weather"]["dims"][1]  # a dimension without labels
 
     def test_what_is_too_large_is_named(self, path):
-        with h5netcdf.File(path, decode_vlen_strings=True) as file:
-            whole = packed(file)
+        with st.open(path) as tree:
+            whole = packed(tree)
             room = sum(len(row["data"]) for group in whole for row in group["variables"]) // 2
-            some = packed(file, room)
+            some = packed(tree, room)
         assert 0 < sum(len(row["data"]) for group in some for row in group["variables"]) <= room
         for group, less in zip(whole, some):
             names = [[row["name"] for row in one["variables"]] for one in (group, less)]

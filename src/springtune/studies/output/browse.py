@@ -18,9 +18,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import h5netcdf
 import jinja2
 import numpy as np
+import pandas as pd
+import xarray as xr
 import yaml
 from markupsafe import Markup
 
@@ -29,8 +30,9 @@ from springtune.problem.quantities import Status
 from springtune.safe_io import write_json, write_text
 
 from ..config.model import VIEWS, kind_files
-from . import answers, reading
-from .answers import Columns, DefinitionErrors, Variables, definition_errors, requested_cells
+from . import reading
+from .answers import ERROR_COLOURS, ERROR_RANGE, DefinitionErrors, definition_errors, status_words, what_to_type
+from .dataset import columns, flag_words, like_with_like, requested_cells, sign_of_errors
 from .text import label_text, range_text
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
@@ -81,12 +83,10 @@ def views() -> dict[str, View]:
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
-    with reading.opened(dataset) as file, reading.guarded(dataset):
-        groups = packed(file)
-        parts = {group.name: _read(group, file) for group in (file, *file.groups.values()) if group.name in GROUPS}
-        found = overview(parts)
+    with reading.open(dataset) as tree, reading.guarded(dataset):
+        groups, found = packed(tree), overview(tree)
     attributes, library = groups[0]["attributes"], _library()
-    scale = {"colours": answers.ERROR_COLOURS, "range": answers.ERROR_RANGE}
+    scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
     content = {"groups": groups, "declared": {path: asdict(view) for path, view in views().items()}, "scale": scale}
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in PAGE_SCRIPTS) + "})();\n"
@@ -141,10 +141,9 @@ EMPTY_TEXT = -1  # number of an empty text
 MOST_CHARACTERS = 4_200_000  # most characters of all numbers: the page with its library stays below 5 MB
 
 
-def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
+def packed(tree: xr.DataTree, room: int = MOST_CHARACTERS) -> list[dict[str, Any]]:
     """Describe and pack the groups of a dataset; leave out and name the largest variables if there is no room."""
-    children = [group for group in file.groups.values() if group.variables]
-    groups = [_describe(group, file.variables) for group in (file, *children)]
+    groups = [_describe(node, tree.to_dataset()) for node in tree.subtree if node is tree or node.data_vars]
     rows = [(group, row) for group in groups for row in group["variables"]]
     excess = sum(len(row["data"]) for _, row in rows) - room
     # Cells last: without them there is no table.
@@ -156,64 +155,34 @@ def packed(file: h5netcdf.File, room: int = MOST_CHARACTERS) -> list[dict[str, A
     return groups
 
 
-StoredVariables = Mapping[str, h5netcdf.Variable]
-
-
-def _describe(group: h5netcdf.Group, root: StoredVariables) -> dict[str, Any]:
-    """Describe and pack a group: its own variables, with labels that it may share with the `root`."""
-    own, rows, sizes = group.variables, list[dict[str, Any]](), dict[str, int]()
-    for name, stored in own.items():
-        if stored.dimensions == (name,):
-            sizes[name] = len(stored)
+def _describe(node: xr.DataTree, root: xr.Dataset) -> dict[str, Any]:
+    """Describe and pack a group: its variables, and labels that it may share with the `root`."""
+    data, rows = node.to_dataset(), list[dict[str, Any]]()
+    for name, stored in data.variables.items():
+        if name in data.dims:
             continue
-        row: dict[str, Any] = {"name": name, "dims": list(stored.dimensions)} | _words_on(stored)
+        row: dict[str, Any] = {"name": name, "dims": list(stored.dims)} | _words_on(stored)
         if "flag_meanings" in stored.attrs:
-            meanings = str(stored.attrs["flag_meanings"]).split()
-            flags = np.ravel(stored.attrs.get("flag_values", range(len(meanings)))).tolist()
-            row["flags"] = dict(zip(map(str, flags), meanings))
-        values = _values(stored)  # each read, packed and forgotten
-        sizes |= dict(zip(stored.dimensions, values.shape))
+            row["flags"] = {str(flag): word for flag, word in flag_words(data[name]).items()}
+        values = stored.values  # each read, packed and forgotten
         if name == "status":
-            values = _mark_beyond_linear(own, row, values)
+            values = _mark_beyond_linear(data, row)
         elif ERROR.search(name) and row.get("units", "1") == "1":
             row["error"] = True
             if _has_sign(row, values):
-                row |= {"signed": True, "sign": _sign_sentence(name, own, root)}
+                row |= {"signed": True, "sign": _sign_sentence(name, data, root)}
         rows.append(row | _pack_values(values))
-    dims = [{"name": name, "size": size} | _labels(name, own, root) for name, size in sizes.items()]
-    attributes = {name: _json_value(value) for name, value in group.attrs.items() if name != "coordinates"}
-    return {"path": group.name, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
+    dims = [{"name": name, "size": size} for name, size in node.to_dataset(inherit=False).sizes.items()]
+    for dim in dims:
+        if dim["name"] in data.coords:
+            stored = data.variables[dim["name"]]
+            dim |= {"labels": list(map(_json_value, stored.values.tolist()))} | _words_on(stored)
+    attributes = {name: _json_value(value) for name, value in node.attrs.items()}
+    return {"path": node.path, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
 
 
-def _labels(name: str, own: StoredVariables, root: StoredVariables) -> dict[str, Any]:
-    """Labels of a dimension with their unit and name; empty if it has none."""
-    stored = own.get(name) or root.get(name)
-    return {"labels": list(map(_json_value, stored[...].tolist()))} | _words_on(stored) if stored else {}
-
-
-def _words_on(stored: h5netcdf.Variable) -> dict[str, str]:
+def _words_on(stored: xr.Variable) -> dict[str, str]:
     return {name: str(stored.attrs[name]) for name in ("units", "long_name") if name in stored.attrs}
-
-
-def _read(group: h5netcdf.Group, root: h5netcdf.File) -> dict[str, tuple[Sequence[str], np.ndarray]]:
-    """Dimensions and values of a group's numbers and labels, and of those labels that it shares with the root."""
-    dims = {name for stored in group.variables.values() for name in stored.dimensions}
-    labels = {name: root.variables[name] for name in dims if name in root.variables}
-    return {
-        name: (stored.dimensions, _values(stored))
-        for name, stored in (labels | dict(group.variables)).items()
-        if len(stored.dimensions) == 1 or np.dtype(stored.dtype).kind in "iuf" or name == REMARK
-    }
-
-
-def _values(stored: h5netcdf.Variable) -> np.ndarray:
-    """Values of an array; missing integers are NaN."""
-    values, fill = stored[...], stored.attrs.get("_FillValue")
-    return np.where(values == fill, np.nan, values) if fill is not None and values.dtype.kind in "iu" else values
-
-
-def _broadcast(stored: h5netcdf.Variable, dims: Sequence[str]) -> np.ndarray:
-    return answers.broadcast(dims, stored.dimensions, stored[...])
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -228,16 +197,16 @@ REFERENCES = {
 """Reference variables of errors, if not `reference_displacement`."""
 
 
-def _mark_beyond_linear(own: StoredVariables, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
+def _mark_beyond_linear(data: xr.Dataset, row: dict[str, Any]) -> np.ndarray:
     """Give solved cells that the linear reference cannot judge a status of their own."""
-    applies = own.get("reference_applies")
-    if "flags" not in row or applies is None or not {*applies.dimensions} <= {*row["dims"]}:
-        return status
-    marked = (status == Status.SOLVED) & (_broadcast(applies, row["dims"]) == 0)
+    status, applies = data.status, data.get("reference_applies")
+    if "flags" not in row or applies is None or not {*applies.dims} <= {*status.dims}:
+        return status.values
+    marked = (status == Status.SOLVED) & (applies == 0)
     beyond = len(row["flags"])
     if marked.any():
         row["flags"][str(beyond)] = "beyond_linear"
-    return np.where(marked, beyond, status)
+    return status.where(~marked, beyond).values
 
 
 def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
@@ -247,21 +216,15 @@ def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
     return "without sign" not in said and (stated or bool((values < 0).any()))
 
 
-def _sign_sentence(name: str, own: StoredVariables, root: StoredVariables) -> str:
+def _sign_sentence(name: str, data: xr.Dataset, root: xr.Dataset) -> str:
     """Sentence on which sign of a group's errors means too soft."""
     reference = REFERENCES.get(name, "reference_displacement")
-    reference = reference if reference in own else "reference_displacement"
-    group = own if reference in own else root
-    if reference not in group or not re.fullmatch("(deformation_|face_|expected_)?error", name):
+    reference = reference if reference in data else "reference_displacement"
+    data = data if reference in data else root
+    if reference not in data or not re.fullmatch("(deformation_|face_|expected_)?error", name):
         return "positive: too large"
-    dims, others, values = group[reference].dimensions, False, group[reference][...]
-    if "quantity_kind" in group:
-        displacements = _broadcast(group["quantity_kind"], dims) == "displacement"
-        others = bool((np.isfinite(values) & ~displacements).any())
-        values = np.where(displacements, values, np.nan)
-    axes = {one: _labels(one, own, root).get("labels", ()) for one in dims}
-    said = answers.sign_of_displacements(values, axes)
-    if others:
+    said = sign_of_errors(data, reference)
+    if (data[reference].notnull() & (data.get("quantity_kind", "displacement") != "displacement")).any():
         return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
     return said
 
@@ -339,10 +302,6 @@ SOURCES = (
     Source("/samples", "samples", "deformation_error", "", "load"),
 )
 
-GROUPS = {*(source.group for source in SOURCES), "/finite_strain", "/sensitivity"}  # groups that the overview reads
-
-REMARK = "paper_remark"  # variable that says where the print contradicts itself
-
 LOOKS = 8  # different colours of lines and dots
 
 SMALLEST_PERCENT = 1e-4  # smaller errors stand at the end of their axis
@@ -394,18 +353,19 @@ class Chart(NamedTuple):
     title: str = ""
 
 
-def overview(groups: Mapping[str, Variables]) -> Content:
-    """Content of the overview of a dataset's groups."""
-    found, root, curves = [], groups.get("/", {}), groups.get("/sensitivity", {})
+def overview(tree: xr.DataTree) -> Content:
+    """Content of the overview of a dataset."""
+    found, groups = [], {node.path: node.to_dataset() for node in tree.subtree}
+    root, curves = groups["/"], groups.get("/sensitivity", {})
     for source in SOURCES:
-        group = groups.get(source.group, {})
-        if {source.error, "status", "definition"} <= {*group}:
-            finite = groups.get("/finite_strain", {}) if source.group == "/" else {}
-            content = _errors(source, requested_cells(group, finite, source.error))
-            found.append(content | {"finite_strain": bool(answers.own_laws(finite))})
+        data = groups.get(source.group, xr.Dataset())
+        if {source.error, "status", "definition"} <= {*data.variables}:
+            data = like_with_like(data, groups.get("/finite_strain") if source.group == "/" else None)
+            content = _errors(source, requested_cells(data, source.error))
+            found.append(content | {"finite_strain": "finite_strain" in data.attrs})
     return {
         "sources": found,
-        "curves": _curves({**root, **curves}) if "deformation_error" in curves else {},
+        "curves": _curves(curves) if "deformation_error" in curves else {},
         "paper": _paper_tables(requested_cells(root)) if "paper_table" in root else {},
     }
 
@@ -413,21 +373,20 @@ def overview(groups: Mapping[str, Variables]) -> Content:
 # -- what to type, errors and times ------------------------------------------------------------------------------------
 
 
-def _errors(source: Source, cells: Columns) -> Content:
+def _errors(source: Source, cells: pd.DataFrame) -> Content:
     """What to type, errors of definitions, and errors over run time."""
-    found = sorted(definition_errors(cells), key=lambda one: one.median)
-    typed = [*answers.what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
+    cells["percent"] = 100 * cells.valid_error.abs().clip(lower=SMALLEST_PERCENT / 100)
+    typed = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
     content: Content = {"source": source, "answers": typed[:MOST_ANSWERS], "further": len(typed) - MOST_ANSWERS}
-    if found:
-        percents = np.maximum(100 * np.abs(cells["valid_error"]), SMALLEST_PERCENT)
-        content["errors"] = _dots(found, percents, cells[source.by], cells["valid_error"])
-        if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
-            pairs = {*zip(cells[source.body].tolist(), cells["mesh_size"].tolist())}
-            alike = len(pairs) == len({body for body, _ in pairs}) * len({size for _, size in pairs})
-            # Where each body has mesh sizes of its own, medians by mesh size would be of different bodies.
-            sizes = [_size(size) if alike else "" for size in cells["mesh_size"].tolist()]
-            seconds = np.nan_to_num(cells["solve_seconds"] + cells["definition_seconds"])
-            content["times"] = _times(found[:LOOKS], percents, np.array(sizes), seconds)
+    if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
+        pairs = cells[[source.body, "mesh_size"]].drop_duplicates()
+        alike = len(pairs) == pairs[source.body].nunique() * pairs.mesh_size.nunique()
+        # Where each body has mesh sizes of its own, medians by mesh size would be of different bodies.
+        cells["size"] = cells.mesh_size.map(_size) if alike else ""
+        cells["seconds"] = (cells.solve_seconds + cells.definition_seconds).fillna(0).clip(lower=SHORTEST_TIME)
+    if found := sorted(definition_errors(cells), key=lambda one: one.median):
+        content["errors"] = _dots(found, source.by, cells[source.by].unique())
+        content["times"] = _times(found[:LOOKS]) if "seconds" in cells else None
     return content
 
 
@@ -439,67 +398,61 @@ def _stiffnesses(values: np.ndarray) -> str:
     return re.sub(r"e\+0?", "e", range_text(values)) + " N/m"
 
 
-def _dots(found: Sequence[DefinitionErrors], percents: np.ndarray, labels: np.ndarray, errors: np.ndarray) -> Chart:
+def _dots(found: Sequence[DefinitionErrors], by: str, labels: Iterable[str]) -> Chart:
     """Errors of each definition: medians by label, of all, and the worst."""
-    x, dots, rows = Axis(ERROR_AXIS, percents[np.concatenate([one.places for one in found])], log=True), [], []
-    names = {label: number % LOOKS for number, label in enumerate(dict.fromkeys(labels.tolist()))}
+    x, dots, rows = Axis(ERROR_AXIS, pd.concat([one.cells.percent for one in found]), log=True), [], []
+    names = {label: number % LOOKS for number, label in enumerate(labels)}
     for row, one in enumerate(found):
-        y, own = 100 - 100 * (row + 0.5) / len(found), percents[one.places]
-        median, worst = f"{100 * one.median:.2g} %", error_text(errors[one.worst])
+        y, own = 100 - 100 * (row + 0.5) / len(found), one.cells.percent
+        median, worst = f"{100 * one.median:.2g} %", error_text(one.worst.valid_error)
         rows.append((y, ", ".join(one.labels), f"{median}; {worst}"))
-        for label, look in names.items():
-            if (mine := own[labels[one.places] == label]).size:
-                size = float(np.median(mine))
-                dots.append((f"look{look}", x.at(size), y, f"{label}: median {size:.2g} %"))
+        for label, size in own.groupby(one.cells[by], sort=False).median().items():
+            dots.append((f"look{names[label]}", x.at(size), y, f"{label}: median {size:.2g} %"))
         dots.append(("worst", x.at(own.max()), y, f"worst: {worst}"))
-        dots.append(("median", x.at(np.median(own)), y, f"median: {median}"))
+        dots.append(("median", x.at(own.median()), y, f"median: {median}"))
     return Chart(x, None, rows, dots=dots, names=names)
 
 
-def _times(found: Sequence[DefinitionErrors], percents: np.ndarray, sizes: np.ndarray, seconds: np.ndarray) -> Chart:
+def _times(found: Sequence[DefinitionErrors]) -> Chart:
     """Median error over median run time, a line a definition through its mesh sizes."""
-    medians = {}
-    for one in found:
-        parts = {size: one.places[sizes[one.places] == size] for size in dict.fromkeys(sizes[one.places].tolist())}
-        medians[", ".join(one.labels)] = [(size, float(np.median(seconds[places])), float(np.median(percents[places])))
-                                          for size, places in parts.items()]  # fmt: skip
-    _, times, errors = zip(*(row for rows in medians.values() for row in rows))
-    x, y = Axis("run time [s]", np.maximum(times, SHORTEST_TIME), log=True), Axis(ERROR_AXIS, errors, log=True)
-    lines, dots = [], []
+    medians = {", ".join(one.labels): one.cells.groupby("size", sort=False)[["seconds", "percent"]].median()
+               for one in found}  # fmt: skip
+    whole, lines, dots = pd.concat(medians), [], []
+    x, y = Axis("run time [s]", whole.seconds, log=True), Axis(ERROR_AXIS, whole.percent, log=True)
     for look, (name, rows) in enumerate(medians.items()):
-        lines.append((look, [(x.at(max(time, SHORTEST_TIME)), y.at(error)) for _, time, error in rows]))
-        texts = [f"{name}, {size}: {error:.2g} %, {time:.2g} s".replace(", :", ":") for size, time, error in rows]
-        dots += [(f"look{look}", *place, text) for place, text in zip(lines[-1][1], texts)]
+        lines.append((look, [(x.at(time), y.at(error)) for time, error in rows.to_numpy()]))
+        for place, (size, time, error) in zip(lines[-1][1], rows.itertuples()):
+            said = ", ".join(filter(None, (name, size)))
+            dots.append((f"look{look}", *place, f"{said}: {error:.2g} %, {time:.2g} s"))
     return Chart(x, y, lines=lines, dots=dots, names={name: look for look, name in enumerate(medians)})
 
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 
 
-def _curves(curves: Variables) -> Content:
+def _curves(curves: xr.Dataset) -> Content:
     """Charts of the error over k / (E t), one for each mesh type, material and load: nonlinear where there is one."""
-    dims, errors = curves["deformation_error"]
-    labels = {name: curves[name][1].tolist() for name in dims}
-    ratios = curves["stiffness_ratio"][1]
-    panels: dict[tuple[str, ...], list[tuple[Content, tuple[int, ...]]]] = {}
-    for place in map(tuple, np.argwhere(np.isfinite(errors).any(axis=-1))):
-        cell = {name: labels[name][at] for name, at in zip(dims, place)}
-        panels.setdefault(tuple(cell[name] for name in PANEL_LABELS), []).append((cell, place))
+    ratios, known = curves.stiffness_ratio.values, curves.deformation_error.notnull().any("stiffness_ratio")
+    found = pd.DataFrame(columns(curves, known, ("predicted_stiffness", "best_stiffness")))
+    curves = curves[["deformation_error", "stiffness"]]
+    found["place"] = np.argwhere(known.values).tolist()
+    panels = dict(list(found.groupby([*PANEL_LABELS], sort=False)))
     shown = [panel for panel in panels if panel[-1] == "nonlinear" or (*panel[:-1], "nonlinear") not in panels]
-    looks = {_size(size): number % LOOKS for number, size in enumerate(labels["mesh_size"])}
+    looks = {_size(size): number % LOOKS for number, size in enumerate(curves.mesh_size.values)}
     x, charts = Axis("k / (E t)", ratios), []
     for panel in shown[:MOST_PANELS]:
         lines, dots, members = [], [], panels[panel]
-        for cell, place in members[:MOST_LINES]:
-            size, percents = _size(cell["mesh_size"]), 100 * errors[place]
+        for _, cell in members[:MOST_LINES].iterrows():
+            one = curves.isel(dict(zip(known.dims, cell.place)))
+            size, percents = _size(cell.mesh_size), 100 * one.deformation_error.values
             kept = np.abs(percents) <= LARGEST_CURVE_PERCENT
-            points = [(x.at(one), CURVE_AXIS.at(other)) for one, other in zip(ratios[kept], percents[kept])]
+            points = [(x.at(ratio), CURVE_AXIS.at(error)) for ratio, error in zip(ratios[kept], percents[kept])]
             lines.append((looks[size], points))
-            membrane = float(np.nanmedian(curves["stiffness"][1][place] / ratios))
+            membrane = float(np.nanmedian(one.stiffness.values / ratios))
             for name in ("predicted", "best"):
-                stiffness = float(curves[f"{name}_stiffness"][1][place])
+                stiffness = cell[f"{name}_stiffness"]
                 if ratios[0] <= stiffness / membrane <= ratios[-1]:
-                    text = f"{cell['beam']}, {size}, {name}: {stiffness:.4g} N/m"
+                    text = f"{cell.beam}, {size}, {name}: {stiffness:.4g} N/m"
                     dots.append((f"{name} look{looks[size]}", x.at(stiffness / membrane), CURVE_AXIS.at(0), text))
         more = f"; {len(members) - MOST_LINES} curves more" if len(members) > MOST_LINES else ""
         charts.append(Chart(x, CURVE_AXIS, lines=lines, dots=dots, title=", ".join(panel) + more))
@@ -510,24 +463,23 @@ def _curves(curves: Variables) -> Content:
 # -- the paper's tables ------------------------------------------------------------------------------------------------
 
 
-def _paper_tables(cells: Columns) -> Content:
+def _paper_tables(cells: pd.DataFrame) -> Content:
     """Tables of the paper: printed numbers, and beside them our reference and errors of definitions."""
     tables: dict[str, dict[Any, Content]] = {}
     kinematics: dict[str, str] = {}  # that of each definition which is shown: nonlinear if there is one
     for one in sorted(definition_errors(cells), key=lambda one: (one.labels[0] != "paper", one.median)):
         name, own = one.labels
         kinematics[name] = own if own == "nonlinear" else kinematics.get(name, own)
-    for place in np.flatnonzero(np.isfinite(cells["paper_table"])):
-        cell: Content = {name: values[place] for name, values in cells.items()}
+    for cell in cells[cells.paper_table.notna()].to_dict("records"):
         title = f"Table {cell['paper_table']:g}: {cell['load']}, {cell['mesh_type']}, {cell['material']}"
         row = tables.setdefault(title, {}).setdefault((cell["beam"], f"{1e3 * cell['mesh_size']:.4g}"), {
             "printed": (f"{1e3 * cell['paper_reference_displacement']:.3f}", f"{1e3 * cell['paper_displacement']:.2f}",
-                        f"{100 * cell['paper_deformation_error']:.2f}" + "*" * bool(cell.get(REMARK))),
+                        f"{100 * cell['paper_deformation_error']:.2f}" + "*" * bool(cell.get("paper_remark"))),
             "reference": f"{1e3 * cell['reference_displacement']:.3f}", "errors": {},
         })  # fmt: skip
         if cell["kinematics"] == kinematics.get(cell["definition"]):
             status, error = Status(cell["status"]), f"{100 * cell['deformation_error']:+.2f}"
-            row["errors"][cell["definition"]] = error if status == Status.SOLVED else str(status).replace("_", " ")
+            row["errors"][cell["definition"]] = error if status == Status.SOLVED else status_words(status)
     return {"tables": dict(sorted(tables.items())[:MOST_PANELS]), "kinematics": kinematics}
 
 

@@ -18,12 +18,12 @@ import xarray as xr
 from xarray.backends import H5NetCDFStore
 from xarray.conventions import cf_encoder, encode_dataset_coordinates
 
+from springtune.problem.compare import sign_sentence
 from springtune.problem.quantities import OF_BODIES, SWEPT, Status, shown_order
 from springtune.problem.shapes import beam_label
 from springtune.safe_io import replacing
 
-from ..config.model import EMPTY_VALUES, STRAINED_REFERENCE
-from .answers import own_law, own_laws, sign_of_displacements, variables
+from ..config.model import EMPTY_VALUES, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
 
 STATUS = tuple(map(str, Status))  # meanings of `status` flags in order of value
 
@@ -264,8 +264,8 @@ def is_flagged(array: xr.DataArray) -> bool:
 
 def flag_words(array: xr.DataArray) -> dict[int, str]:
     """Meanings of flags by value."""
-    values = np.atleast_1d(array.attrs.get("flag_values", [])).tolist()
-    return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
+    meanings = str(array.attrs["flag_meanings"]).split()
+    return dict(zip(map(int, np.ravel(array.attrs.get("flag_values", range(len(meanings))))), meanings))
 
 
 def as_words(array: xr.DataArray) -> np.ndarray:
@@ -357,13 +357,21 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     return found.reset_coords([name for name in chosen if name in found.coords])
 
 
-def sign_of_errors(data: xr.Dataset) -> str:
-    """Sentence on which sign of a group's errors means too soft; empty without references."""
-    if "reference_displacement" not in data:
-        return ""
-    references = data.reference_displacement
-    axes = {str(name): references[name].values.tolist() for name in references.dims}
-    return sign_of_displacements(references.values, axes)
+def sign_of_errors(data: xr.Dataset, reference: str = "reference_displacement") -> str:
+    """Sentence on which sign of errors means too soft, by loads or else quantities; empty without any reference."""
+    signs = np.sign(data.get(reference, xr.DataArray()))
+    if "quantity_kind" in data:
+        signs = signs.where(data.quantity_kind == "displacement")
+    known = signs.values[np.isfinite(signs.values) & (signs.values != 0)]
+    if not known.size or (known == known[0]).all():
+        return sign_sentence({"": known[0]}) if known.size else ""
+    for name, where in (("load", "under"), ("quantity", "of")):
+        if name in signs.dims:
+            others = [one for one in signs.dims if one != name]
+            low, high = signs.min(others), signs.max(others)
+            if not ((low < 0) & (high > 0)).any():
+                return sign_sentence(dict(zip(map(str, signs[name].values), (low + high).values)), where)
+    return "too soft: errors with the sign of their reference"
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:
@@ -378,13 +386,27 @@ def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label
     return records(xr.Dataset(), there.transpose(*names), ())
 
 
-def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> list[dict[str, Any]]:
+def columns(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> dict[str, np.ndarray]:
     """Labels and variables of present cells, last dimension fastest; selecting each takes a thousand times as long."""
     places = dict(zip(map(str, present.dims), np.nonzero(present.values)))
-    columns = {name: present[name].values[numbers].tolist() for name, numbers in places.items()}
-    for name in names:
-        columns[name] = data[name].values[tuple(places[str(one)] for one in data[name].dims)].tolist()
-    return [dict(zip(columns, row)) for row in zip(*columns.values())]
+    labels = {name: present[name].values[numbers] for name, numbers in places.items()}
+    return labels | {name: data[name].values[tuple(places[str(one)] for one in data[name].dims)] for name in names}
+
+
+def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> list[dict[str, Any]]:
+    """Rows of `columns`."""
+    found = {name: values.tolist() for name, values in columns(data, present, names).items()}
+    return [dict(zip(found, row)) for row in zip(*found.values())]
+
+
+def requested_cells(data: xr.Dataset, error: str = "deformation_error") -> pd.DataFrame:
+    """Labels and variables of requested cells; `valid_error` is NaN where the reference does not apply."""
+    dims = data[error].dims
+    present = (data.status != Status.NOT_REQUESTED).broadcast_like(data[error]).transpose(*dims)
+    own = [str(name) for name, one in data.variables.items() if one.dims and {*one.dims} <= {*dims}]
+    cells = pd.DataFrame(columns(data, present, own))
+    valid = (cells.status == Status.SOLVED) & (cells.get("reference_applies", 1) == 1)
+    return cells.assign(valid_error=cells[error].where(valid))
 
 
 Scaled = Mapping[str, tuple[str, float]]  # variable and factor by the column of a table
@@ -459,18 +481,30 @@ def in_own_plane(data: xr.Dataset) -> xr.Dataset:
     return data.assign({name: one.where(own) for name, one in numbers.items()}).drop_vars("material_plane")
 
 
-def select_own_law(finite: xr.Dataset) -> xr.Dataset | None:
-    """Select the reference of each material's own law and plane; where none has a number, each says why."""
-    # Large arrays are read on demand: only these are looked into.
-    found = variables(finite[[name for name in ("reference_displacement", "material_plane") if name in finite]])
-    if not own_laws(found):
-        return None
-    dims, law, _ = own_law(found)
-    return in_own_plane(finite).isel(reference=xr.DataArray(law, dims=dims)).drop_vars("reference")
+def own_laws(data: xr.Dataset) -> list[str]:
+    """References of materials' own laws in a group of references, by priority; in plane strain only with planes."""
+    own = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, *((STRAINED_REFERENCE,) if "material_plane" in data else ()))
+    return [law for law in own if law in data.reference.values]
+
+
+def like_with_like(root: xr.Dataset, finite: xr.Dataset | None) -> xr.Dataset:
+    """Root with errors of nonlinear networks against the law of each material at finite strain, where there are any."""
+    laws = [] if finite is None else own_laws(finite)
+    if finite is None or not laws:
+        return root
+    own = in_own_plane(finite).sel(reference=laws)
+    known = own.reference_displacement.notnull() | (own.reference == laws[-1])  # the last says why there is none
+    own = own.isel(reference=known.argmax("reference")).drop_vars("reference")
+    linear, names = root.kinematics == "linear", ("deformation_error", "reference_displacement", "reference_message")
+    chosen = {name: root[name].where(linear, own[name]) for name in names if name in own and name in root}
+    chosen["deformation_error"] = chosen["deformation_error"].transpose(*root.deformation_error.dims)
+    if "reference_displacement" in chosen and "reference_applies" in root:
+        chosen["reference_applies"] = root.reference_applies.where(linear, own.reference_displacement.notnull())
+    return root.assign(chosen).assign_attrs(finite_strain=True)
 
 
 def own_law_reference(cell: xr.Dataset, name: str) -> str | None:
     """Label of a material's own reference: a solved one if there is any; None without a reference."""
-    laws, cell = own_laws(variables(cell)), in_own_plane(cell)
+    laws, cell = own_laws(cell), in_own_plane(cell)
     there = [law for law in laws if np.isfinite(cell[name].sel(reference=law).values).any()]
     return next(iter(there or laws[::-1]), None)

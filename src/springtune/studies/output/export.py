@@ -17,7 +17,7 @@ from springtune.safe_io import check_folder, replacing, write_text
 from ...registry import how_to_install
 from . import reading
 from .answers import plane_vectors
-from .dataset import CELL_NODES, SPRING_NODES, as_words, is_flagged
+from .dataset import CELL_NODES, SPRING_NODES, as_words, cells, is_flagged
 from .text import cell_text
 
 TABLE_ENDINGS = (".csv", ".parquet")
@@ -80,10 +80,9 @@ def write_scenes(tree: xr.DataTree, folder: Path) -> None:
         old.unlink()
     fields, rows = tree["fields"].to_dataset(), []
     solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
-    solved = solved.transpose(*MESH_DIMENSIONS, *(name for name in solved.dims if name not in MESH_DIMENSIONS))
-    units = {name: str(fields[name].attrs.get("units", "1")) for name in solved.dims}
-    for place in np.argwhere(solved.values):
-        labels = {str(name): solved[name][at].item() for name, at in zip(solved.dims, place)}
+    order = *MESH_DIMENSIONS, *(str(name) for name in solved.dims if name not in MESH_DIMENSIONS)
+    units = {name: str(fields[name].attrs.get("units", "1")) for name in order}
+    for labels in cells(solved, order):
         name = cell_text(labels, units).replace(", ", "_").replace(" ", "") + ".vtu"
         _write_scene(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", "")} | labels)
         rows.append({"file": name} | labels)
@@ -94,13 +93,11 @@ def _write_scene(path: Path, network: xr.Dataset, labels: Mapping[str, object]) 
     """Write a network: particles with displacements, springs as lines, cells; all in SI units."""
     network = network.squeeze([name for name in labels if name in network.dims])  # a mesh may be of one cell
     corners = network[CELL_NODES].transpose("cell", ...).values
-    cells = {2: network[SPRING_NODES].transpose("spring", ...).values}
-    cells |= {count: corners[(corners >= 0).sum(axis=1) == count][:, :count] for count in (3, 4)}
+    elements = {2: network[SPRING_NODES].transpose("spring", ...).values}
+    elements |= {count: corners[(corners >= 0).sum(axis=1) == count][:, :count] for count in (3, 4)}
     points = {"displacement": plane_vectors(network, "displacement_{}")}
-    expected = (
-        plane_vectors(network, "particle_reference_{}") if "particle_reference_x" in network else np.array(np.nan)
-    )
-    if np.isfinite(expected).all():
+    known = "particle_reference_x" in network
+    if known and np.isfinite(expected := plane_vectors(network, "particle_reference_{}")).all():
         points |= {"reference_displacement": expected, "error": points["displacement"] - expected}
     springs = {"stiffness": {2: network.stiffness.values}, "force": {2: network.spring_force.values}}
-    write_vtu(path, plane_vectors(network, "{}"), cells, points, springs, {}, json.dumps(labels, indent=1))
+    write_vtu(path, plane_vectors(network, "{}"), elements, points, springs, {}, json.dumps(labels, indent=1))

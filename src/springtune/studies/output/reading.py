@@ -10,7 +10,6 @@ from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io import BeyondBound, DataElsewhere, bounded, check_alone, clipped
 
 if TYPE_CHECKING:
-    import h5netcdf
     import xarray
 
     from .dataset import Label
@@ -52,20 +51,9 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     Traceback (most recent call last):
     FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc
     """
-    from .dataset import tree  # here, since the page to browse does without xarray
-
-    with ExitStack() as stack:
-        file = stack.enter_context(opened(path))
-        with readable(path), bounded(OPENING_BYTES):
-            found = tree(file)
-        found.set_close(stack.pop_all().close)
-    return found
-
-
-@contextmanager
-def opened(path: str | os.PathLike[str]) -> "Iterator[h5netcdf.File]":
-    """Context of the open file of a dataset; other files are refused."""
     import h5netcdf
+
+    from .dataset import tree
 
     path = dataset_file(path)
     with ExitStack() as stack:
@@ -78,7 +66,10 @@ def opened(path: str | os.PathLike[str]) -> "Iterator[h5netcdf.File]":
         name = attributes.get("study", "unknown")
         if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
             raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
-        yield file
+        with readable(path), bounded(OPENING_BYTES):
+            found = tree(file)
+        found.set_close(stack.pop_all().close)
+    return found
 
 
 @contextmanager

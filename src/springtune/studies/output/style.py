@@ -22,7 +22,6 @@ from matplotlib.text import Text
 from matplotlib.ticker import NullLocator
 
 from springtune.problem.compare import sign_sentence
-from springtune.problem.quantities import Status
 
 from .answers import ERROR_COLOURS, ERROR_RANGE, plane_vectors
 
@@ -242,16 +241,6 @@ def sizes_axis(panel: Axes, sizes: np.ndarray, count: int) -> list[np.ndarray]:
     panel.xaxis.set_minor_locator(NullLocator())
     panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
     return [sizes] * count
-
-
-def status_words(flags: int | Iterable[int] | np.ndarray) -> str:
-    """Statuses of requested cells in words, each once."""
-    return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
-
-
-def count_statuses(flags: np.ndarray) -> dict[str, int]:
-    """Number of requested cells by status in words."""
-    return {status_words(flag): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
 
 
 def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:

@@ -17,10 +17,11 @@ from springtune.safe_io import aligned, clock, shown
 from ..runs.plan import DATASET, PAGE, PAPER_FILE, SUMMARY, Job
 from ..runs.source import RECORDS, read_note
 from . import reading
-from .answers import Columns, Variables, definition_errors, own_laws, requested_cells, variables, what_to_type
+from .answers import count_statuses, definition_errors, status_words, what_to_type
 from .text import NOT_ALL_SOLVED, bytes_text, cell_text, from_json, paragraphs, range_text, without_numbers
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
     from ..config.model import Study
@@ -38,23 +39,25 @@ COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "
 
 def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
     """Summarise a study's cells, with the errors of at most so many definitions."""
+    from .dataset import like_with_like, requested_cells  # here, since reports of a run do without xarray
+
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(count), said] for what, count, said, _ in states if count]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
-    for name, (error, reference) in COMPARED.items():
-        if name in groups and "definition" in groups[name].get(error, groups[name]).dims:
-            finite = variables(groups["/finite_strain"]) if name == "/" and "/finite_strain" in groups else {}
-            found = requested_cells(variables(groups[name]), finite, error)
-            lines += _errors(found, groups[name][error], found[reference], finite, most)
+    for name, names in COMPARED.items():
+        if name in groups and "definition" in groups[name].get(names[0], groups[name]).dims:
+            data = like_with_like(groups[name], groups.get("/finite_strain") if name == "/" else None)
+            cells = requested_cells(data, names[0])
+            lines += _errors(cells, data, names, most)
             if name == "/":  # of shapes quantities have errors
-                lines += _stiffness_to_type(found)
+                lines += _stiffness_to_type(cells)
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == "/" else name.strip("/"))
     holes = []
     for what, count, _, lost in states:
         for status, cells in lost.items():
-            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {count}", *_cell_lines(cells)]
+            lines += ["", f"{what}, {status_words(status)}: {len(cells)} of {count}", *_cell_lines(cells)]
         holes += [f"{sum(map(len, lost.values()))} of {count} {what}"] if lost else []
     if holes:
         lines += ["", f"{NOT_ALL_SOLVED}: {'; '.join(holes)}. dataset.nc names each, and why: `status`, `message`."]
@@ -64,7 +67,7 @@ def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFI
 Cells = list[tuple[str, str]]
 
 
-def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, Mapping[Status, Cells]]]:
+def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, dict[int, Cells]]]:
     """Subject, number of cells, their statuses in words and unsolved cells of each status variable."""
     for variable in data.data_vars.values():
         label = str(variable.name)
@@ -72,14 +75,12 @@ def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, Mapp
         if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
             continue
         flags, messages = variable.values, data[message].values
-        places = {status: flags == status for status in Status if status and (flags == status).any()}
-        lost: dict[Status, Cells] = {
-            one: _cells(data, variable.dims, at, messages) for one, at in places.items() if one != Status.SOLVED
-        }
+        unsolved = np.unique(flags[flags > Status.SOLVED]).tolist()
+        lost = {status: _cells(data, variable.dims, flags == status, messages) for status in unsolved}
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == "/" else ", ".join(filter(None, (name.strip("/"), part)))
-        said = ", ".join(f"{at.sum()} {_words(status)}" for status, at in places.items())
-        yield what, sum(int(at.sum()) for at in places.values()), said, lost
+        said = ", ".join(f"{count} {word}" for word, count in count_statuses(flags).items())
+        yield what, np.count_nonzero(flags), said, lost
 
 
 def _cells(data: "xr.Dataset", dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
@@ -90,10 +91,6 @@ def _cells(data: "xr.Dataset", dims: Iterable[Hashable], there: np.ndarray, mess
         (cell_text({name: labels[name][at] for name, at in zip(labels, place)}, units), str(messages[tuple(place)]))
         for place in np.argwhere(there)
     ]
-
-
-def _words(status: Status) -> str:
-    return str(status).replace("_", " ")
 
 
 def _cell_lines(cells: Cells) -> Iterator[str]:
@@ -108,33 +105,30 @@ def _cell_lines(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - named} more"
 
 
-def _errors(
-    cells: Columns, error: "xr.DataArray", reference: np.ndarray, finite: Variables, most: int | None
-) -> Iterator[str]:
+def _errors(cells: "pd.DataFrame", data: "xr.Dataset", names: tuple[str, str], most: int | None) -> Iterator[str]:
     """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
-    found = sorted(definition_errors(cells), key=lambda one: -one.errors.max())
+    error, reference = names
+    found = sorted(definition_errors(cells), key=lambda one: -abs(one.worst.valid_error))
     if found:
-        what = str(error.name).replace("_", " ")
+        what = error.replace("_", " ")
         yield from ("", f"{what}s, (network - reference) / |reference|, of solved scenes within the reference")
-        if own_laws(finite):
+        if "finite_strain" in data.attrs:
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         by = [name for name in ("definition", "kinematics") if name in cells]
-        others = [str(name) for name in error.dims if name not in by]
-        units = {name: str(error[name].attrs.get("units", "1")) for name in others}
-        rows = []
+        others = [str(name) for name in data[error].dims if name not in by]
+        units, rows = {name: str(data[name].attrs.get("units", "1")) for name in others}, []
         for one in found[:most]:
-            worst, place = float(cells["valid_error"][one.worst]), {name: cells[name][one.worst] for name in others}
-            kind = str(cells["quantity_kind"][one.worst]) if "quantity_kind" in cells else "displacement"
-            word = sign_word(worst, float(reference[one.worst]), kind)
-            numbers = [f"{100 * one.median:.3g} %", f"{100 * worst:+.3g} %"]
-            rows.append([*one.labels, len(one.errors), *numbers, word, cell_text(place, units)])
+            worst = one.worst
+            word = sign_word(worst.valid_error, worst[reference], worst.get("quantity_kind", "displacement"))
+            numbers = [f"{100 * one.median:.3g} %", f"{100 * worst.valid_error:+.3g} %"]
+            rows.append([*one.labels, len(one.cells), *numbers, word, cell_text(dict(worst[others]), units)])
         heads = [*by, "values" if "quantity" in others else "scenes", "median", "worst", "", "at"]
         yield from aligned([heads, *rows], 2, range(len(by), len(by) + 3)).splitlines()
     if most is not None and len(found) > most:
-        yield f"  and of {len(found) - most} more at most {100 * found[most].errors.max():.2f} %"
+        yield f"  and of {len(found) - most} more at most {100 * abs(found[most].worst.valid_error):.2f} %"
 
 
-def _stiffness_to_type(cells: Columns) -> Iterator[str]:
+def _stiffness_to_type(cells: "pd.DataFrame") -> Iterator[str]:
     """What to type on the finest mesh of each type and material: of the best definition and the best uniform one."""
     rows = [
         [one.definition, *one.labels, f"{1e3 * one.mesh_size:.4g} mm", range_text(one.inside), range_text(one.outline),

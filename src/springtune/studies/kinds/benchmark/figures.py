@@ -6,6 +6,7 @@ from springtune.problem.compare import unbeaten
 from springtune.problem.quantities import Status
 
 from ...output import style
+from ...output.answers import count_statuses
 from ...output.dataset import STATUS, choose, group, table_rows
 from . import PARTS
 
@@ -58,7 +59,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     case = data.sel(choose(data.scene.notnull(), scene=scene))
     rings = unbeaten(case.assured_error.values, case.seconds.values)
     ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
-    counts = style.count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
+    counts = count_statuses(case.status.values[case.status.values != Status.SOLVED]) if "status" in case else {}
     missing = ", ".join(f"{count} {word}" for word, count in counts.items())
     lost = "; ".join(filter(None, (ringed, missing and f"not drawn: {missing}")))
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 4.0))

@@ -12,7 +12,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from ...config.model import distinct
 from ...output import style
-from ...output.answers import plane_vectors
+from ...output.answers import plane_vectors, status_words
 from ...output.dataset import (
     at,
     cells,
@@ -25,9 +25,9 @@ from ...output.dataset import (
     shown_swept,
     sign_of_errors,
 )
-from ...output.style import BEYOND_SMALL_STRAIN, draw_network, extent, magnification, status_words
+from ...output.style import BEYOND_SMALL_STRAIN, draw_network, extent, magnification
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
-from .tables import like_with_like
+from .tables import own_references
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 
@@ -418,7 +418,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     >>> axes[0].get_xlabel(), axes[0].get_ylabel()
     ('Mesh size [mm]', 'Deformation error [%]')
     """
-    root, beams, selection = by_beam(like_with_like(data), beam, mesh_type, material, load, kinematics)
+    root, beams, selection = by_beam(own_references(data), beam, mesh_type, material, load, kinematics)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
     shown = {_beam_title(root, name, values): root.sel(beam=name) for name in beams}
@@ -506,7 +506,7 @@ def plot_sweep(
     Traceback (most recent call last):
     ValueError: parameter: 'force' is not swept; the study sweeps nothing
     """
-    root = like_with_like(data)
+    root = own_references(data)
     swept = [name for name in SWEPT if name in root.status.dims]
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")

@@ -6,7 +6,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from springtune.safe_io import no_mathematics
 
 from ...output import style
-from ...output.answers import plane_vectors
+from ...output.answers import plane_vectors, status_words
 from ...output.dataset import STATUS, cells, choose, group, labels_of
 from .outputs import ERRORS_STEM, shape_figures
 
@@ -153,7 +153,7 @@ def _draw_errors(panels, cut, name, points):
 
 
 def _reason_without_error(cut):
-    states = style.status_words(cut.status.values) or "not asked for"
+    states = status_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"
 
@@ -327,5 +327,5 @@ def _draw_network(panel, one, state, scale, most):
     notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []
     if STATUS[int(state.status)] != "solved":
         message = f": {state.message.item()[:120]}" if lines is None else ""
-        notes.append(style.status_words(int(state.status)) + message)
+        notes.append(status_words(int(state.status)) + message)
     return notes

@@ -7,7 +7,7 @@ from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT
 
-from ...output.dataset import STATUS, cells, group, in_own_plane, labels_of, records, select_own_law, table_rows
+from ...output.dataset import STATUS, cells, group, in_own_plane, labels_of, like_with_like, records, table_rows
 from ...output.present import MOST_ROWS, error_decimals, head
 from ...output.text import decimals, number, range_text
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
@@ -19,26 +19,17 @@ def tables(tree):
     root = tree.to_dataset()
     if "status" not in root:  # a study without scenes
         return shapes
-    own = like_with_like(tree)
+    own = own_references(tree)
     found = [_scene_table(own.sel(selection), selection) for selection in cells(own.status != 0, TABLE_LABELS)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
     groups = {"finite_strain": _finite_strain_table, "block": _block_table}
     return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree] + shapes
 
 
-def like_with_like(data):
+def own_references(data):
     """Root with errors of nonlinear networks against references at finite strain, where there are any."""
-    root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
-    finite = None if finite is None else select_own_law(finite)
-    if finite is None:
-        return root
-    linear, names = root.kinematics == "linear", ("deformation_error", "reference_displacement", "reference_message")
-    own = {name: root[name].where(linear, finite[name]) for name in names if name in finite and name in root}
-    own["deformation_error"] = own["deformation_error"].transpose(*root.deformation_error.dims)
-    if "reference_displacement" in own and "reference_applies" in root:
-        own["reference_applies"] = root.reference_applies.where(linear, finite.reference_displacement.notnull())
-    return root.assign(own).assign_attrs(finite_strain=True)
+    return like_with_like(group(data, "/"), finite)
 
 
 # -- scenes ------------------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import numpy as np
 from springtune.safe_io import no_mathematics
 
 from ...output import style
+from ...output.answers import count_statuses
 from ...output.dataset import cells, choose, group, labels_of, table_rows
 
 
@@ -116,7 +117,7 @@ def _draw_dots(panel, laid, names, variable):
         panel.plot(values[solved[1:]], np.full(len(solved[1:]), number), markerfacecolor="white", **mark)
         panel.plot(values[solved[:1]], np.full(len(solved[:1]), number), markersize=4.5, label=definition, **mark)
         if not len(solved):
-            said = ", ".join(style.count_statuses(strips.status.values)) or "not requested"
+            said = ", ".join(count_statuses(strips.status.values)) or "not requested"
             panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
                        fontsize=style.SMALL_TEXT, color="0.25")  # fmt: skip
     panel.set_yticks(range(len(names)), map(no_mathematics, names))

@@ -6,6 +6,7 @@ import pandas as pd
 from springtune.safe_io import no_mathematics
 
 from ...output import style
+from ...output.answers import count_statuses
 from ...output.dataset import choose, group, labelled_beam, labels_of, most_requested, sign_of_errors, unswept
 from ...output.style import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 
@@ -76,7 +77,7 @@ def _moduli(panel, here):
     for number, names in enumerate(style.group_equal_curves(curves, 0.012)):
         panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
     said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
-    counts = ", ".join(f"{name} ({count})" for name, count in style.count_statuses(here.status.values).items())
+    counts = ", ".join(f"{name} ({count})" for name, count in count_statuses(here.status.values).items())
     return said, f"No definition has moduli here: {counts or 'none was requested'}."
 
 
