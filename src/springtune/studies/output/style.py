@@ -443,6 +443,8 @@ def magnification(fields: "xr.Dataset") -> float:
     return float(steps[steps <= factor * (1 + 1e-9)][-1])
 
 
+COLOURS = 256  # colours of matplotlib's maps
+
 NETWORK_LINE_WIDTH = 0.35  # width of the lines of springs that have one colour [pt]
 
 
@@ -464,13 +466,18 @@ def draw_network(
     kept = (nodes >= 0).all(axis=1)
     springs = moved[nodes[kept]]
     panel.set(aspect="equal", adjustable="datalim")
-    if not most:  # one line with gaps: thousands of lines take ten times as long
-        gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    # One line with gaps a colour: thousands of lines take ten times as long.
+    gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    if not most:
         panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE_WIDTH)
         return None
     width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
-    forces = fields.spring_force.values[kept]
-    lines = LineCollection(springs, array=forces, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
-    panel.add_collection(lines)
+    levels = np.clip(np.floor((fields.spring_force.values[kept] / most + 1) * COLOURS / 2), 0, COLOURS - 1)
+    shown = np.unique(levels)
+    coloured = [gaps[levels == level].reshape(-1, 2) for level in shown]
+    middle = most * ((2 * shown + 1) / COLOURS - 1)
+    lines = LineCollection(coloured, array=middle, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
+    panel.add_collection(lines, autolim=False)
+    panel.update_datalim(springs.reshape(-1, 2))
     panel.autoscale()
     return lines

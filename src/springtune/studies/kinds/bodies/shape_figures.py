@@ -90,7 +90,7 @@ def _select_case(data, shape, load, material, kinematics):
     for name, label in (("material", material), ("kinematics", kinematics)):
         chosen[name] = label or labels_of(here, name)[0]
     chosen = choose(present, **chosen)
-    return data.sel(chosen), chosen
+    return data.sel(chosen).load(), chosen
 
 
 def _quantities(cut):
@@ -107,7 +107,8 @@ def described(cut, name):
 def _points_of_line(cut, name, definition):
     """Points of a line by particles: particles, seconds, sizes of errors [%], and whether each counts."""
     against = _error_variable(cut, name)
-    line = cut.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
+    read = cut[["particles", "solve_seconds", "definition_seconds", "status", against]]
+    line = read.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
     seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
     counted = (line.status.values == STATUS.index("solved")) & (int(cut.reference_applies.item()) != 0)
     found = [line.particles.values, seconds, 100 * np.abs(line[against].values), counted]
@@ -324,7 +325,7 @@ def _draw_network(panel, one, state, scale, most):
     lines = style.draw_network(panel, one, scale, most, FORCE_COLOURS)
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
-    notes = ["forces in an energy"] if lines is not None and not np.abs(lines.get_array()).max() > 0 else []
+    notes = ["forces in an energy"] if lines is not None and not one.spring_force.fillna(0).any() else []
     if STATUS[int(state.status)] != "solved":
         message = f": {state.message.item()[:120]}" if lines is None else ""
         notes.append(status_words(int(state.status)) + message)
