@@ -136,8 +136,6 @@ LONG_DIMENSION = 16  # fewest labels of a last dimension that counts as points a
 CELL_BITS_CLEARED, LINE_BITS_CLEARED = 6, 9
 """Cleared bits of 23: 5 digits of a number are left, and 4 of a point on a line, finer than a pixel."""
 
-EMPTY_TEXT = -1  # number of an empty text
-
 MOST_CHARACTERS = 4_200_000  # most characters of all numbers: the page with its library stays below 5 MB
 
 
@@ -165,8 +163,11 @@ def _describe(node: xr.DataTree, root: xr.Dataset) -> dict[str, Any]:
         if "flag_meanings" in stored.attrs:
             row["flags"] = {str(flag): word for flag, word in flag_words(data[name]).items()}
         values = stored.values  # each read, packed and forgotten
-        if name == "status":
-            values = _mark_beyond_linear(data, row)
+        if name == "status" and "flags" in row and "reference_applies" in data:
+            # Solved cells that the linear reference cannot judge have a status of their own.
+            beyond, number = (stored == Status.SOLVED) & (data.reference_applies.variable == 0), len(row["flags"])
+            row["flags"] |= {str(number): "beyond_linear"} if beyond.any() else {}
+            values = np.where(beyond.transpose(*stored.dims), number, values)
         elif ERROR.search(name) and row.get("units", "1") == "1":
             row["error"] = True
             if _has_sign(row, values):
@@ -174,9 +175,8 @@ def _describe(node: xr.DataTree, root: xr.Dataset) -> dict[str, Any]:
         rows.append(row | _pack_values(values))
     dims = [{"name": name, "size": size} for name, size in node.to_dataset(inherit=False).sizes.items()]
     for dim in dims:
-        if dim["name"] in data.coords:
-            stored = data.variables[dim["name"]]
-            dim |= {"labels": list(map(_json_value, stored.values.tolist()))} | _words_on(stored)
+        if (name := dim["name"]) in data.coords:
+            dim |= {"labels": list(map(_json_value, data[name].values.tolist()))} | _words_on(data[name].variable)
     attributes = {name: _json_value(value) for name, value in node.attrs.items()}
     return {"path": node.path, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}
 
@@ -195,18 +195,6 @@ REFERENCES = {
     "expected_error": "expected_value",
 }
 """Reference variables of errors, if not `reference_displacement`."""
-
-
-def _mark_beyond_linear(data: xr.Dataset, row: dict[str, Any]) -> np.ndarray:
-    """Give solved cells that the linear reference cannot judge a status of their own."""
-    status, applies = data.status, data.get("reference_applies")
-    if "flags" not in row or applies is None or not {*applies.dims} <= {*status.dims}:
-        return status.values
-    marked = (status == Status.SOLVED) & (applies == 0)
-    beyond = len(row["flags"])
-    if marked.any():
-        row["flags"][str(beyond)] = "beyond_linear"
-    return status.where(~marked, beyond).values
 
 
 def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
@@ -250,11 +238,9 @@ def _pack_values(values: np.ndarray) -> dict[str, Any]:
     if values.dtype.kind in "iub":
         return _pack({"type": "integer"}, values.astype(np.int32), values != 0)
     # No array of texts, which gives each the room of the longest one.
-    texts = list(map(str, (values if values.dtype.kind == "O" else values.astype(str)).ravel().tolist()))
-    words = sorted(set(texts))
-    numbers_of = {word: number if word else EMPTY_TEXT for number, word in enumerate(words)}
-    places = np.fromiter(map(numbers_of.__getitem__, texts), np.int32, len(texts)).reshape(values.shape)
-    return _pack({"type": "text", "words": words}, places, places != EMPTY_TEXT)
+    places, words = pd.factorize(np.where(values == "", None, values.astype(object)).ravel(), sort=True)
+    places = places.astype(np.int32).reshape(values.shape)
+    return _pack({"type": "text", "words": [*map(str, words)]}, places, places >= 0)
 
 
 def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
@@ -361,8 +347,7 @@ def overview(tree: xr.DataTree) -> Content:
         data = groups.get(source.group, xr.Dataset())
         if {source.error, "status", "definition"} <= {*data.variables}:
             data = like_with_like(data, groups.get("/finite_strain") if source.group == "/" else None)
-            content = _errors(source, requested_cells(data, source.error))
-            found.append(content | {"finite_strain": "finite_strain" in data.attrs})
+            found.append(_errors(source, data))
     return {
         "sources": found,
         "curves": _curves(curves) if "deformation_error" in curves else {},
@@ -373,11 +358,13 @@ def overview(tree: xr.DataTree) -> Content:
 # -- what to type, errors and times ------------------------------------------------------------------------------------
 
 
-def _errors(source: Source, cells: pd.DataFrame) -> Content:
+def _errors(source: Source, data: xr.Dataset) -> Content:
     """What to type, errors of definitions, and errors over run time."""
+    cells = requested_cells(data, source.error)
     cells["percent"] = 100 * cells.valid_error.abs().clip(lower=SMALLEST_PERCENT / 100)
     typed = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
-    content: Content = {"source": source, "answers": typed[:MOST_ANSWERS], "further": len(typed) - MOST_ANSWERS}
+    content: Content = {"source": source, "finite_strain": "finite_strain" in data.attrs}
+    content |= {"answers": typed[:MOST_ANSWERS], "further": len(typed) - MOST_ANSWERS}
     if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
         pairs = cells[[source.body, "mesh_size"]].drop_duplicates()
         alike = len(pairs) == pairs[source.body].nunique() * pairs.mesh_size.nunique()

@@ -73,8 +73,7 @@ class VariableChanges(NamedTuple):
     rows: list[Change]
 
 
-@dataclass(frozen=True)
-class CellsOfOne:
+class CellsOfOne(NamedTuple):
     """Cells of only one dataset: their number, and the labels of the first."""
 
     count: int = 0
@@ -133,7 +132,8 @@ def compare(
 
     Numeric labels match in nine digits, NaN equals NaN, and `MEASURED_VARIABLES` is left out.
     """
-    nodes = [{node.path: _rounded(node.to_dataset()) for node in tree.subtree} for tree in (before, after)]
+    trees = before, after
+    nodes = [{node.path: _rounded(node.to_dataset()) for node in tree.subtree} for tree in trees]
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
@@ -147,12 +147,10 @@ def compare(
     chosen = [[path for path in side if path in wanted] for side in nodes]
     both = {path: [side[path] for side in nodes] for path in chosen[0] if path in chosen[1]}
     found = [_compare_group(one, pair, roots, left_out, tolerance or Tolerance(), most) for one, pair in both.items()]
-    facts = [tree.attrs | from_json(tree.attrs.get("software")) for tree in (before, after)]
+    facts = [one.attrs | from_json(one.attrs.get("software")) | from_json(one.attrs.get("inputs")) for one in trees]
     names = [str(name) for name in facts[0] | facts[1] if name not in HIDDEN_ATTRIBUTES]
-    noted = {name: (str(facts[0].get(name, "")), str(facts[1].get(name, ""))) for name in names}
-    inputs = [from_json(tree.attrs.get("inputs")) for tree in (before, after)]
-    noted |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
-    return Comparison(found, _names_of_one(chosen), {name: pair for name, pair in noted.items() if pair[0] != pair[1]})
+    pairs = ((name, tuple(str(side.get(name, "")) for side in facts)) for name in names)
+    return Comparison(found, _names_of_one(chosen), {name: (old, new) for name, (old, new) in pairs if old != new})
 
 
 def _rounded(data: xr.Dataset) -> xr.Dataset:

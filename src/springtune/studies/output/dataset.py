@@ -270,9 +270,8 @@ def flag_words(array: xr.DataArray) -> dict[int, str]:
 
 def as_words(array: xr.DataArray) -> np.ndarray:
     """Convert flags to words; empty for unknown ones."""
-    known, back = np.unique(array.values, return_inverse=True)
-    words = flag_words(array)
-    return np.array([words.get(int(one), "") for one in known], dtype=object)[back].reshape(array.shape)
+    words = pd.Series(array.values.ravel()).map(flag_words(array)).astype(object).fillna("")
+    return words.to_numpy().reshape(array.shape)
 
 
 # -- the group and the labels that a figure shows ----------------------------------------------------------------------

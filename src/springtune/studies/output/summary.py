@@ -3,7 +3,7 @@
 import os
 import time
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,7 +39,7 @@ COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "
 
 def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
     """Summarise a study's cells, with the errors of at most so many definitions."""
-    from .dataset import like_with_like, requested_cells  # here, since reports of a run do without xarray
+    from .dataset import like_with_like, requested_cells
 
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(count), said] for what, count, said, _ in states if count]
@@ -74,23 +74,22 @@ def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, dict
         message = label.removesuffix("status") + "message"
         if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
             continue
-        flags, messages = variable.values, data[message].values
+        flags = variable.values
         unsolved = np.unique(flags[flags > Status.SOLVED]).tolist()
-        lost = {status: _cells(data, variable.dims, flags == status, messages) for status in unsolved}
+        lost = {status: _cells(data, variable == status, message) for status in unsolved}
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == "/" else ", ".join(filter(None, (name.strip("/"), part)))
         said = ", ".join(f"{count} {word}" for word, count in count_statuses(flags).items())
         yield what, np.count_nonzero(flags), said, lost
 
 
-def _cells(data: "xr.Dataset", dims: Iterable[Hashable], there: np.ndarray, messages: np.ndarray) -> Cells:
+def _cells(data: "xr.Dataset", there: "xr.DataArray", message: str) -> Cells:
     """Labels and messages of some cells."""
-    units = {str(name): str(data[name].attrs.get("units", "1")) for name in dims if name in data.coords}
-    labels = {str(name): data[name].values if name in data.coords else range(data.sizes[name]) for name in dims}
-    return [
-        (cell_text({name: labels[name][at] for name, at in zip(labels, place)}, units), str(messages[tuple(place)]))
-        for place in np.argwhere(there)
-    ]
+    from .dataset import records  # here, since reports of a run do without xarray
+
+    units = {str(name): str(data[name].attrs.get("units", "1")) for name in there.dims}
+    said = [(str(row.pop(message)), row) for row in records(data, there, [message])]
+    return [(cell_text(labels, units), why) for why, labels in said]
 
 
 def _cell_lines(cells: Cells) -> Iterator[str]:
@@ -154,7 +153,7 @@ def _lines_on_references(root: "xr.Dataset", called: str) -> Iterator[str]:
             continue
         few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
         few = few.transpose(*root.reference_message.dims)
-        cells = _cells(root, few.dims, few.values, root.reference_message.values)
+        cells = _cells(root, few, "reference_message")
         yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_cell_lines(cells))
 
 
@@ -164,8 +163,7 @@ def _lines_on_references(root: "xr.Dataset", called: str) -> Iterator[str]:
 class Info(str):
     """Text that terminals and notebooks show verbatim."""
 
-    def __repr__(self) -> str:
-        return str(self)
+    __repr__ = str.__str__
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self)}</pre>"

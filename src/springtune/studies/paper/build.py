@@ -94,11 +94,11 @@ IGNORED_PATTERNS = (
     re.compile(r"@[\w-]+(?:\[[^\]]*\])?"),
     re.compile(r"<[\w-]+>"),
     re.compile(r"https?://\S+"),
+    re.compile(
+        r"\b(?:[Tt]ables?|[Ff]igures?|[Ee]quations?|[Ss]ections?)[\s~]+\d+(?:\.\d+)*(?:(?:,|[\s~]+to|[\s~]+and|–|-)[\s~]*\d+(?:\.\d+)*)*"
+    ),
+    re.compile(r"\b[23]-?D\b|(?<=[A-Za-z_])\d+\w*"),
 )
-REFERENCE_PATTERN = re.compile(
-    r"\b(?:[Tt]ables?|[Ff]igures?|[Ee]quations?|[Ss]ections?)[\s~]+\d+(?:\.\d+)*(?:(?:,|[\s~]+to|[\s~]+and|–|-)[\s~]*\d+(?:\.\d+)*)*"
-)
-NAME_PATTERN = re.compile(r"\b[23]-?D\b|(?<=[A-Za-z_])\d+\w*")
 FORMULA_PATTERN = re.compile(r"\$[^$]*\$")
 SINGLE_DIGIT_PATTERN = re.compile(r"(?<![\d.,])\d(?![\d.,]*\d)")
 NUMBER_PATTERN = re.compile(r"\d[\d.,]*(?:\s*%|\s*[a-zA-Zµ°]+\b)?")
@@ -118,8 +118,6 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
     for pattern in IGNORED_PATTERNS:
         text = pattern.sub(_blank, text)
     text = FORMULA_PATTERN.sub(lambda formula: SINGLE_DIGIT_PATTERN.sub(_blank, formula.group()), text)
-    for pattern in (REFERENCE_PATTERN, NAME_PATTERN):
-        text = pattern.sub(_blank, text)
     for found in NUMBER_PATTERN.finditer(text):
         yield text.count("\n", 0, found.start()) + 1, found.group().strip()
 
