@@ -17,8 +17,9 @@ from pypdf import PdfReader
 
 import springtune as st
 from springtune.studies.config.model import outputs
+from springtune.studies.kinds.bodies.shape_figures import NETWORK_LINE_WIDTH
 from springtune.studies.output import style
-from springtune.studies.output.style import NETWORK_LINE_WIDTH, png_and_pdf
+from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import closure
 
 from synthetic import BEAMS, DEFINITIONS, SIZES, TYPES, dataset

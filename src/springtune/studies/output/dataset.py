@@ -119,12 +119,6 @@ class Group:
         return replace(self, variables=variables)
 
 
-def most_requested(root: xr.Dataset, dimension: str) -> str:
-    """Label of a dimension with the most requested scenes."""
-    counts = (root.status != 0).sum([name for name in root.status.dims if name != dimension])
-    return str(counts[dimension].values[counts.values.argmax()])
-
-
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 NO_NODE = EMPTY_VALUES["no node"]  # fill value of UGRID connectivities
@@ -330,20 +324,6 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
 SHOWN_PREFIX = "shown_"  # prefix of variables that hold the swept values of stored fields
 
 
-def unswept(root: xr.Dataset) -> xr.Dataset:
-    """Root at the last swept values of each beam, material and load."""
-    return at(root, last_swept(root.status != 0))
-
-
-def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Swept values whose fields the dataset holds."""
-    names = [name for name in SWEPT if name in root.dims and f"{SHOWN_PREFIX}{name}" in fields]
-    coordinates = [name for name in root.dims if name in SWEPT]
-    # Nothing is kept of what has no value: any will do.
-    values = {name: fields[f"{SHOWN_PREFIX}{name}"].fillna(root[name].values[0]) for name in names}
-    return {name: value.drop_vars(coordinates, errors="ignore") for name, value in values.items()}
-
-
 def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     """Select one swept value for each beam, material and load."""
     chosen = {name: value for name, value in values.items() if name in data.dims}
@@ -500,10 +480,3 @@ def like_with_like(root: xr.Dataset, finite: xr.Dataset | None) -> xr.Dataset:
     if "reference_displacement" in chosen and "reference_applies" in root:
         chosen["reference_applies"] = root.reference_applies.where(linear, own.reference_displacement.notnull())
     return root.assign(chosen).assign_attrs(finite_strain=True)
-
-
-def own_law_reference(cell: xr.Dataset, name: str) -> str | None:
-    """Label of a material's own reference: a solved one if there is any; None without a reference."""
-    laws, cell = own_laws(cell), in_own_plane(cell)
-    there = [law for law in laws if np.isfinite(cell[name].sel(reference=law).values).any()]
-    return next(iter(there or laws[::-1]), None)

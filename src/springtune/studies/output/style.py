@@ -1,7 +1,6 @@
 """One style for all figures, readable in grey at a journal's column or page width; plots of a single scene or curve."""
 
 import io
-import math
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,7 +13,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
@@ -23,7 +22,7 @@ from matplotlib.ticker import NullLocator
 
 from springtune.problem.compare import sign_sentence
 
-from .answers import ERROR_COLOURS, ERROR_RANGE, plane_vectors
+from .answers import ERROR_COLOURS, ERROR_RANGE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -218,31 +217,6 @@ def wrap_to_panel(panel: Axes, texts: Iterable[str], size: float | None = None, 
 # -- lines -------------------------------------------------------------------------------------------------------------
 
 
-def group_equal_curves(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
-    """Groups of curves that look like one line, in order."""
-    groups: list[list[str]] = []
-    for name, values in curves.items():
-        for group in groups:
-            if np.allclose(values, curves[group[0]], rtol=0, atol=within, equal_nan=True):
-                group.append(name)
-                break
-        else:
-            groups.append([name])
-    return groups
-
-
-def sizes_axis(panel: Axes, sizes: np.ndarray, count: int) -> list[np.ndarray]:
-    """Set up an axis of mesh sizes [mm]; return the x of each line: points of a single size stand side by side."""
-    if len(sizes) == 1:
-        panel.set(xlabel=f"One mesh size, {sizes[0]:g} mm", xlim=(-0.6, count - 0.4), xticks=[])
-        return [np.array([float(number)]) for number in range(count)]
-    panel.set(xscale="log", xlabel="Mesh size [mm]")
-    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    panel.xaxis.set_minor_locator(NullLocator())
-    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
-    return [sizes] * count
-
-
 def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:
     """Name lines in the order of their ends, and write notes below; without lines write `why`."""
     ends = {}
@@ -402,7 +376,7 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
     return panel
 
 
-# -- networks of a dataset ---------------------------------------------------------------------------------------------
+# -- heat maps ---------------------------------------------------------------------------------------------------------
 
 
 def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
@@ -421,63 +395,3 @@ def error_text(error: float, sign: str = "+") -> str:
     """Format an error [%] for a cell of a heat map."""
     size = abs(error)
     return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
-
-
-def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, float]:
-    """Width and height of points, shape (n, 2), without NaN; `nothing` if they have no extent."""
-    known = places[np.isfinite(places).all(axis=1)]
-    wide, high = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
-    return (float(wide), float(high)) if min(wide, high) > 0 else nothing
-
-
-def magnification(fields: "xr.Dataset") -> float:
-    """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
-    places = np.concatenate([plane_vectors(fields, "{}"), plane_vectors(fields, "outline_{}")])
-    names = ("reference_displacement", "displacement")
-    sizes = (np.hypot(fields[f"{name}_x"].values, fields[f"{name}_y"].values) for name in names)
-    largest = next(filter(None, (np.max(size, where=np.isfinite(size), initial=0.0) for size in sizes)), 0.0)
-    factor = 0.07 * max(extent(places, (0.0, 0.0))) / largest if largest else 0.0
-    if not factor or 0.4 < factor < 2:
-        return 1.0
-    steps = np.array([1, 2, 5]) * 10.0 ** math.floor(math.log10(factor))
-    return float(steps[steps <= factor * (1 + 1e-9)][-1])
-
-
-COLOURS = 256  # colours of matplotlib's maps
-
-NETWORK_LINE_WIDTH = 0.35  # width of the lines of springs that have one colour [pt]
-
-
-def draw_network(
-    panel: Axes, fields: "xr.Dataset", scale: float, most: float = 0.0, cmap: Colormap | None = None
-) -> LineCollection | None:
-    """Draw a deformed network, coloured up to `most` [N], over the outline of its reference and the one at rest."""
-    outline, there = plane_vectors(fields, "outline_{}"), plane_vectors(fields, "reference_displacement_{}")
-    rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
-    for number in range(int(rounds.max(initial=-1)) + 1):
-        places = np.flatnonzero(rounds == number)
-        closed = np.append(places, places[:1])
-        panel.plot(*1e3 * (outline + scale * there)[closed].T, color="0.7", linewidth=2.0, zorder=1)
-        panel.plot(*1e3 * outline[closed].T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
-    moved = 1e3 * (plane_vectors(fields, "{}") + scale * plane_vectors(fields, "displacement_{}"))
-    if not np.isfinite(moved).any():
-        return None
-    nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)
-    kept = (nodes >= 0).all(axis=1)
-    springs = moved[nodes[kept]]
-    panel.set(aspect="equal", adjustable="datalim")
-    # One line with gaps a colour: thousands of lines take ten times as long.
-    gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-    if not most:
-        panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE_WIDTH)
-        return None
-    width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
-    levels = np.clip(np.floor((fields.spring_force.values[kept] / most + 1) * COLOURS / 2), 0, COLOURS - 1)
-    shown = np.unique(levels)
-    coloured = [gaps[levels == level].reshape(-1, 2) for level in shown]
-    middle = most * ((2 * shown + 1) / COLOURS - 1)
-    lines = LineCollection(coloured, array=middle, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
-    panel.add_collection(lines, autolim=False)
-    panel.update_datalim(springs.reshape(-1, 2))
-    panel.autoscale()
-    return lines

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import xarray as xr
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
 
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT, with_unit
@@ -14,19 +15,21 @@ from ...config.model import distinct
 from ...output import style
 from ...output.answers import plane_vectors, status_words
 from ...output.dataset import (
+    SHOWN_PREFIX,
     at,
     cells,
     choose,
     group,
+    in_own_plane,
     labelled_beam,
     labels_of,
     last_swept,
-    own_law_reference,
-    shown_swept,
+    own_laws,
     sign_of_errors,
 )
-from ...output.style import BEYOND_SMALL_STRAIN, draw_network, extent, magnification
+from ...output.style import BEYOND_SMALL_STRAIN
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
+from .shape_figures import draw_network, extent, magnification
 from .tables import own_references
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
@@ -287,7 +290,7 @@ def plot_deformed(
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
     cut = cut.sel(definition=definition)
-    values = shown_swept(fields, root)
+    values = _shown_swept(fields, root)
     chosen = {one: selection[one] for one in ("material", "load")}
     values = {name: value.sel(chosen) for name, value in values.items()}
     cut = at(cut, values)
@@ -298,6 +301,15 @@ def plot_deformed(
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
     title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
     return style.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
+
+
+def _shown_swept(fields, root):
+    """Swept values whose fields the dataset holds."""
+    names = [name for name in SWEPT if name in root.dims and f"{SHOWN_PREFIX}{name}" in fields]
+    coordinates = [name for name in root.dims if name in SWEPT]
+    # Nothing is kept of what has no value: any will do.
+    values = {name: fields[f"{SHOWN_PREFIX}{name}"].fillna(root[name].values[0]) for name in names}
+    return {name: value.drop_vars(coordinates, errors="ignore") for name, value in values.items()}
 
 
 def _draw_deformed(panel, part):
@@ -425,11 +437,23 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     return _draw_panels(ax, root, selection, shown, _draw_over_sizes)
 
 
+def _sizes_axis(panel, sizes, count):
+    """Set up an axis of mesh sizes [mm]; return the x of each line: points of a single size stand side by side."""
+    if len(sizes) == 1:
+        panel.set(xlabel=f"One mesh size, {sizes[0]:g} mm", xlim=(-0.6, count - 0.4), xticks=[])
+        return [np.array([float(number)]) for number in range(count)]
+    panel.set(xscale="log", xlabel="Mesh size [mm]")
+    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    panel.xaxis.set_minor_locator(NullLocator())
+    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
+    return [sizes] * count
+
+
 def _draw_over_sizes(panel, here, looks):
     """Draw errors of a beam over mesh size; return notes."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes = 1e3 * here.mesh_size.values
-    places = style.sizes_axis(panel, sizes, len(looks))
+    places = _sizes_axis(panel, sizes, len(looks))
 
     def listed(numbers):
         return f"{', '.join(f'{sizes[number]:g}' for number in numbers)} mm"
@@ -683,12 +707,19 @@ def _draw_errors_over_stiffness(panel, curves, root):
     return said, ""
 
 
+def _own_law_reference(cell, name):
+    """Label of a material's own reference: a solved one if there is any; None without a reference."""
+    laws, cell = own_laws(cell), in_own_plane(cell)
+    there = [law for law in laws if np.isfinite(cell[name].sel(reference=law).values).any()]
+    return next(iter(there or laws[::-1]), None)
+
+
 def _draw_pressed_face(panel, block, root, load):
     """Draw the pressed face over the reference of its kinematics; return notes, and the reason if nothing is drawn."""
     x, pressed, said = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")
-    law = own_law_reference(pressed, "reference_face_profile")
+    law = _own_law_reference(pressed, "reference_face_profile")
     finite = bool(law) and bool(
         pressed.reference_face_profile.sel(reference=law).notnull().any()
         and solved.sel(kinematics=solved.kinematics != "linear").any()

@@ -1,6 +1,9 @@
 """Figures of shapes: errors of quantities over particles and seconds, and deformed networks."""
 
+import math
+
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io import no_mathematics
@@ -236,6 +239,64 @@ def _errors_by_quantity(whole, material, kinematics):
 # -- networks ----------------------------------------------------------------------------------------------------------
 
 
+def extent(places, nothing):
+    """Width and height of points, shape (n, 2), without NaN; `nothing` if they have no extent."""
+    known = places[np.isfinite(places).all(axis=1)]
+    wide, high = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
+    return (float(wide), float(high)) if min(wide, high) > 0 else nothing
+
+
+def magnification(fields):
+    """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
+    places = np.concatenate([plane_vectors(fields, "{}"), plane_vectors(fields, "outline_{}")])
+    names = ("reference_displacement", "displacement")
+    sizes = (np.hypot(fields[f"{name}_x"].values, fields[f"{name}_y"].values) for name in names)
+    largest = next(filter(None, (np.max(size, where=np.isfinite(size), initial=0.0) for size in sizes)), 0.0)
+    factor = 0.07 * max(extent(places, (0.0, 0.0))) / largest if largest else 0.0
+    if not factor or 0.4 < factor < 2:
+        return 1.0
+    steps = np.array([1, 2, 5]) * 10.0 ** math.floor(math.log10(factor))
+    return float(steps[steps <= factor * (1 + 1e-9)][-1])
+
+
+COLOURS = 256  # colours of matplotlib's maps
+
+NETWORK_LINE_WIDTH = 0.35  # width of the lines of springs that have one colour [pt]
+
+
+def draw_network(panel, fields, scale, most=0.0, cmap=None):
+    """Draw a deformed network, coloured up to `most` [N], over the outline of its reference and the one at rest."""
+    outline, there = plane_vectors(fields, "outline_{}"), plane_vectors(fields, "reference_displacement_{}")
+    rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
+    for number in range(int(rounds.max(initial=-1)) + 1):
+        places = np.flatnonzero(rounds == number)
+        closed = np.append(places, places[:1])
+        panel.plot(*1e3 * (outline + scale * there)[closed].T, color="0.7", linewidth=2.0, zorder=1)
+        panel.plot(*1e3 * outline[closed].T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
+    moved = 1e3 * (plane_vectors(fields, "{}") + scale * plane_vectors(fields, "displacement_{}"))
+    if not np.isfinite(moved).any():
+        return None
+    nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)
+    kept = (nodes >= 0).all(axis=1)
+    springs = moved[nodes[kept]]
+    panel.set(aspect="equal", adjustable="datalim")
+    # One line with gaps a colour: thousands of lines take ten times as long.
+    gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    if not most:
+        panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE_WIDTH)
+        return None
+    width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
+    levels = np.clip(np.floor((fields.spring_force.values[kept] / most + 1) * COLOURS / 2), 0, COLOURS - 1)
+    shown = np.unique(levels)
+    coloured = [gaps[levels == level].reshape(-1, 2) for level in shown]
+    middle = most * ((2 * shown + 1) / COLOURS - 1)
+    lines = LineCollection(coloured, array=middle, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
+    panel.add_collection(lines, autolim=False)
+    panel.update_datalim(springs.reshape(-1, 2))
+    panel.autoscale()
+    return lines
+
+
 @style.styled
 def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     """Deformed networks of a shape, springs coloured by their force, over the outline of the reference: one a panel.
@@ -284,12 +345,12 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
     places = np.concatenate([plane_vectors(case, "{}"), plane_vectors(case, "outline_{}")])
-    width, height = style.extent(places, (1.0, 1.0))
+    width, height = extent(places, (1.0, 1.0))
     columns = min(NETWORKS_IN_ROW, len(wanted))
     wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
     tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
     networks = case.reindex(definition=wanted)
-    scale, forces = style.magnification(networks), np.abs(networks.spring_force.values)
+    scale, forces = magnification(networks), np.abs(networks.spring_force.values)
     # Of 3 % of the springs the force is beyond the ends of the colour scale.
     most = float(np.nanquantile(forces, 0.97)) if np.nanmax(forces, initial=0.0) > 0 else 1.0
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
@@ -322,7 +383,7 @@ def _choose_definitions(cut, asked):
 
 def _draw_network(panel, one, state, scale, most):
     """Draw one network; return notes."""
-    lines = style.draw_network(panel, one, scale, most, FORCE_COLOURS)
+    lines = draw_network(panel, one, scale, most, FORCE_COLOURS)
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
     notes = ["forces in an energy"] if lines is not None and not one.spring_force.fillna(0).any() else []

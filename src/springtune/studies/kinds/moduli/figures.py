@@ -7,20 +7,31 @@ from springtune.safe_io import no_mathematics
 
 from ...output import style
 from ...output.answers import count_statuses
-from ...output.dataset import choose, group, labelled_beam, labels_of, most_requested, sign_of_errors, unswept
+from ...output.dataset import at, choose, group, labelled_beam, labels_of, last_swept, sign_of_errors
 from ...output.style import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 
 
 def definitions(tree):
     """Yield the figures of moduli, and of errors by mesh type for the beam and kinematics with most scenes."""
     yield "definitions_moduli", plot_moduli, {}
-    root = unswept(group(tree, "/"))
+    root = _unswept(group(tree, "/"))
     for mesh_type in labels_of(root.status != 0, "mesh_type"):
         selection, own = {"mesh_type": mesh_type}, root[["status"]].sel(mesh_type=[mesh_type])
         for name in ("beam", "kinematics"):
-            selection[name] = most_requested(own, name)
+            selection[name] = _most_requested(own, name)
             own = own.sel({name: [selection[name]]})
         yield f"definitions_loads_{mesh_type}", plot_definitions_loads, selection
+
+
+def _most_requested(root, dimension):
+    """Label of a dimension with the most requested scenes."""
+    counts = (root.status != 0).sum([name for name in root.status.dims if name != dimension])
+    return str(counts[dimension].values[counts.values.argmax()])
+
+
+def _unswept(root):
+    """Root at the last swept values of each beam, material and load."""
+    return at(root, last_swept(root.status != 0))
 
 
 @style.styled
@@ -57,6 +68,15 @@ def plot_moduli(data, ax=None):
     return style.small_multiples(ax, shown, 2, 1.95, title, _moduli)
 
 
+def _group_equal_curves(curves, within):
+    """Groups of curves that look like one line, in order."""
+    groups = {}
+    for name, values in curves.items():
+        alike = (one for one in groups if np.allclose(values, curves[one], rtol=0, atol=within, equal_nan=True))
+        groups.setdefault(next(alike, name), []).append(name)
+    return list(groups.values())
+
+
 def _moduli(panel, here):
     """Draw the moduli of one mesh type; return notes, and a message if there are none."""
     panel.set(xlabel="requested", ylabel="effective")
@@ -74,7 +94,7 @@ def _moduli(panel, here):
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
-    for number, names in enumerate(style.group_equal_curves(curves, 0.012)):
+    for number, names in enumerate(_group_equal_curves(curves, 0.012)):
         panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
     said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
     counts = ", ".join(f"{name} ({count})" for name, count in count_statuses(here.status.values).items())
@@ -112,7 +132,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     >>> [tick.get_text() for tick in axes[0].get_xticklabels()]
     ['traction', 'compression', 'pressure']
     """
-    root = unswept(group(data, "/"))
+    root = _unswept(group(data, "/"))
     chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)
     root = root.sel(chosen)
     solved = root.status == 1
@@ -179,8 +199,8 @@ def tables(tree):
     """Make the table of error ranges by definition, mesh type, material, load and mesh size."""
     if "deformation_error" not in tree:
         return []
-    root = unswept(tree.to_dataset())
-    root = root.sel(kinematics=most_requested(root, "kinematics"))
+    root = _unswept(tree.to_dataset())
+    root = root.sel(kinematics=_most_requested(root, "kinematics"))
     place = ["definition", "mesh_type", "material", "load"]
     cells = root[["deformation_error", "status", "reference_applies"]].assign(ratio=root.mesh_size / root.beam_height)
     frame = cells.to_dataframe([*place, "beam", "mesh_size"]).reset_index()
