@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from functools import partial
 from itertools import chain
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -13,7 +13,9 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     Tag,
+    ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WithJsonSchema,
@@ -29,7 +31,7 @@ from springtune.problem.quantities import PLANES, beyond, nearest
 from springtune.registry import NAME, NAME_RULE
 from springtune.springs.base import DEFINITIONS
 
-from .messages import OrSection, refuse, show
+from .messages import OR_RANGE, explained, refuse, show
 from .model import FURTHER_REFERENCES
 
 MOST_POINTS = 10_001
@@ -48,13 +50,17 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _without_empty_keys(cls, value: object) -> object:
-        if not isinstance(value, dict):
-            return value
-        known = {field.alias or name for name, field in cls.model_fields.items()}
-        return {key: content for key, content in value.items() if content is not None or key not in known}
+    def _read(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Read a section without its empty keys; errors say what is wrong."""
+        keys = {field.alias or name: field for name, field in cls.model_fields.items()}
+        if isinstance(value, dict):
+            value = {key: content for key, content in value.items() if content is not None or key not in keys}
+        try:
+            return handler(value)
+        except ValidationError as error:
+            raise explained(keys, value, error) from None
 
 
 # -- single values -----------------------------------------------------------------------------------------------------
@@ -228,7 +234,7 @@ Angles = Annotated[
         lambda value: [value] if isinstance(value, str) else value, json_schema_input_type=Angle | list[Angle]
     ),
 ]
-Numbers = Annotated[OneOrMore[Item], Field(json_schema_extra=_or_range), WrapValidator(_read_range), OrSection(Range)]
+Numbers = Annotated[OneOrMore[Item], Field(json_schema_extra=_or_range), WrapValidator(_read_range), OR_RANGE]
 """Numbers: one, a list, or a range."""
 
 DefinitionNames = OneOrMore[DefinitionName]

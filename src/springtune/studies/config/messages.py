@@ -1,10 +1,10 @@
 """Bounded YAML with the line of every key, and messages on it that name line, key, value and remedy."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain
+from collections.abc import Iterable, Mapping
+from functools import reduce
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -105,8 +105,7 @@ def words(annotation: Any) -> str:
     origin, (inside, *notes) = _parts(annotation)
     if origin is Annotated:
         found = next((note.title for note in notes if isinstance(note, FieldInfo) and note.title), words(inside))
-        is_range = any(isinstance(note, OrSection) for note in notes)
-        return found.replace(", or a list", ", a list, or a range") if is_range else found
+        return found.replace(", or a list", OR_RANGE) if OR_RANGE in notes else found
     if origin in (Union, UnionType):
         return words(inside)
     if origin is list:
@@ -114,53 +113,21 @@ def words(annotation: Any) -> str:
     return SECTION
 
 
-SECTION = "a section"
+SECTION, OR_RANGE = "a section", ", a list, or a range"
+"""Words for a section, and for more than one number, a note of lists that may be ranges."""
 
 
 def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
     """Origin and arguments of a type; a field is its type, annotated."""
     if isinstance(annotation, FieldInfo):
         annotation = Annotated[annotation.annotation, annotation, *annotation.metadata]
-    return get_origin(annotation), get_args(annotation) or (None,)
+    return get_origin(annotation), get_args(annotation) or (annotation,)
 
 
-class OrSection(NamedTuple):
-    """Note of a value that may be a section, which a validator reads."""
-
-    section: type[BaseModel]
-
-
-def _branches(annotation: Any) -> Iterator[Any]:
-    """Types that a field or type may be: sections, lists, mappings and single values."""
+def _item(annotation: Any) -> Any:
+    """Type of the items of a list or mapping that a field or type is."""
     origin, parts = _parts(annotation)
-    if origin is Annotated:
-        parts = parts[0], *(note.section for note in parts[1:] if isinstance(note, OrSection))
-    if origin in (Annotated, Union, UnionType):
-        yield from chain.from_iterable(map(_branches, parts))
-    else:
-        yield annotation
-
-
-def _inside(annotation: Any, path: Sequence[Key]) -> Any:
-    """Field or type at a path inside a type, or None."""
-    if not path:
-        return annotation
-    for one in _branches(annotation):
-        origin = get_origin(one)
-        is_item = origin in (dict, list, tuple) and isinstance(path[0], int) == (origin is not dict)
-        below = get_args(one)[-1] if is_item else _keys(one).get(path[0])
-        if below is not None and (found := _inside(below, path[1:])) is not None:
-            return found
-    return None
-
-
-def _keys(annotation: Any) -> dict[Key, FieldInfo]:
-    """Fields of a section by their keys in the file."""
-    return {
-        field.alias or name: field
-        for one in _branches(annotation)
-        for name, field in getattr(one, "model_fields", {}).items()
-    }
+    return _item(parts[0]) if origin in (Annotated, Union, UnionType) else parts[-1]
 
 
 WHY = {"int_parsing": "is not a whole number"}
@@ -169,19 +136,31 @@ WHY |= dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal", "
 """Fault of a value, by the type of pydantic's error."""
 
 
-def _message(model: Any, details: Any, path: tuple[Key, ...], value: Any) -> str:
-    """Message of an error of pydantic about the value at a path: value, fault and remedy."""
-    field, above = _inside(model, path), _keys(_inside(model, path[:-1]))
-    if details["type"] == "extra_forbidden":
-        return f"unknown key {show(path[-1])}; {nearest(str(path[-1]), map(str, above))}"
-    if details["type"] == "missing" and path[-1:] == details["loc"][-1:]:
-        return f"'{path[-1]}' is missing; give {words(field)}"
-    if details["type"] == "model_type":
-        return f"{show(value)} instead of keys and values; give the keys {', '.join(map(str, _keys(field)))}"
-    if details["type"] == "too_long":
-        return f"{len(value)} values; give at most {details['ctx']['max_length']}, or split the study into several"
-    why = WHY.get(details["type"], "does not fit") if isinstance(value, str) else f"instead of {words(field)}"
-    return f"{show(value)} {why}; give {words(field)}"
+def explained(keys: Mapping[str, FieldInfo], content: Any, error: ValidationError) -> ValidationError:
+    """Give the errors of a section messages with value, fault and remedy; those of sections inside have theirs."""
+    errors: list[Any] = error.errors(include_url=False)
+    found: list[Any] = []
+    kinds = [details["type"] for details in errors]
+    for number, details in enumerate(errors):
+        kind, place, (path, value) = details["type"], details["loc"], part_of(content, details["loc"])
+        if kind == "study":
+            one = refuse(details["ctx"]["message"], *details["ctx"]["path"])
+        elif kind == "model_type":
+            one = refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(keys)}")
+        elif kind == "extra_forbidden":
+            one = refuse(f"unknown key {show(place[0])}; {nearest(place[0], keys)}")
+        elif kind == "missing":
+            if "extra_forbidden" in kinds or kind in kinds[:number]:
+                continue  # a misspelt key, or the first missing one, is enough
+            one = refuse(f"'{place[0]}' is missing; give {words(keys[place[0]])}", place[0])
+        elif kind == "too_long":
+            one = refuse(f"{len(value)} values; give at most {details['ctx']['max_length']}, or split the study")
+        else:
+            given = words(reduce(lambda inside, _: _item(inside), path[1:], keys[place[0]]))
+            why = WHY.get(kind, "does not fit") if isinstance(value, str) else f"instead of {given}"
+            one = refuse(f"{show(value)} {why}; give {given}")
+        found.append({"type": one, "loc": place, "input": value})
+    return ValidationError.from_exception_data("section", found)
 
 
 def validated(
@@ -191,23 +170,11 @@ def validated(
     try:
         return model.model_validate(content, context=context)
     except ValidationError as error:
-        errors = error.errors(include_url=False)
-        # Of a section the first missing key is enough, and a misspelt one instead.
-        faulty = {details["loc"][:-1] for details in errors if details["type"] == "extra_forbidden"}
-        for details in errors:
+        for details in error.errors(include_url=False):
             # The path of pydantic has steps that the file has not: branches of a union, the item of a single value.
             path, value = part_of(content, details["loc"])
-            if details["type"] == "study":
-                path += details["ctx"]["path"] if isinstance(value, list | dict) else ()
-                message = details["ctx"]["message"].replace("{value}", show(part_of(content, path)[1]))
-            else:
-                if details["type"] == "missing":
-                    if details["loc"][:-1] in faulty:
-                        continue
-                    faulty.add(details["loc"][:-1])
-                    path += details["loc"][-1:] if isinstance(value, dict) else ()
-                message = _message(model, details, path, value)
-            problems.add(path, message, line)
+            path += details["ctx"]["path"] if isinstance(value, list | dict) else ()
+            problems.add(path, details["ctx"]["message"].replace("{value}", show(part_of(content, path)[1])), line)
         problems.stop()
         raise
 

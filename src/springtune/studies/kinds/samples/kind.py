@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
-from ...config.messages import OrSection, refuse, show, words
+from ...config.messages import refuse, show, words
 from ...config.model import Output, Stage, StudyKind, stem
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.plan import Task
@@ -56,7 +56,7 @@ def parameter(name: str, example: str) -> Any:
         schema["anyOf"] = [alone.json_schema(), section.model_json_schema()]
 
     title = f"{words(kind)}, or a range such as `{example}`"
-    return BeforeValidator(read), OrSection(section), Field(title=title, json_schema_extra=or_section)
+    return BeforeValidator(read), Field(title=title, json_schema_extra=or_section)
 
 
 def _distribution(name: str, section: DistributionConfig) -> dict[str, Any]:
