@@ -138,22 +138,15 @@ def _job(stage: Stage, folder: Path, label: str, tasks: Iterable[Task]) -> Job:
     return Job(folder, f"{stage.name}_{label}", digest, products, stage=stage, label=label, content=content)
 
 
-def results(stage: Stage, study: Study, folder: Path) -> Iterator[tuple[Task, dict[str, Any]]]:
-    """Tasks of a stage and the scalars of their stored results, in the order of the tasks."""
-    tasks, files = list(stage.tasks(study)), defaultdict(list)
-    keys = [task.key_of(stage) for task in tasks]
-    for task, key in zip(tasks, keys):
+def rows(stage: Stage, study: Study, folder: Path) -> Iterator[dict[str, Any]]:
+    """Rows of the stored results of a stage, in the order of its tasks, each with the labels of its task."""
+    tasks, files = [(task, task.key_of(stage)) for task in stage.tasks(study)], defaultdict(list)
+    for task, key in tasks:
         files[task.file or key].append(key)
     found = {name: store.read(folder / stage.folder / f"{name}.h5", held) for name, held in files.items()}
-    for task, key in zip(tasks, keys):
-        yield task, dict(found[task.file or key][key])
-
-
-def rows(stage: Stage, study: Study, folder: Path) -> Iterator[dict[str, Any]]:
-    """Rows of the stored results of a stage, each with the labels of its task."""
-    for task, result in results(stage, study, folder):
-        for row in result.get("rows", [result]):
-            yield {**task.labels, **row}
+    for task, key in tasks:
+        result = found[task.file or key][key]
+        yield from ({**task.labels, **row} for row in result.get("rows", [result]))
 
 
 # -- jobs after the stages ---------------------------------------------------------------------------------------------
