@@ -172,7 +172,7 @@ def _describe(node: xr.DataTree, root: xr.Dataset) -> dict[str, Any]:
             row["error"] = True
             if _has_sign(row, values):
                 row |= {"signed": True, "sign": _sign_sentence(name, data, root)}
-        rows.append(row | _pack_values(values))
+        rows.append(row | _pack(values))
     dims = [{"name": name, "size": size} for name, size in node.to_dataset(inherit=False).sizes.items()]
     for dim in dims:
         if (name := dim["name"]) in data.coords:
@@ -230,36 +230,29 @@ def _json_value(value: Any) -> Any:
     return value if isinstance(value, bool | int | float | str) else str(value)
 
 
-def _pack_values(values: np.ndarray) -> dict[str, Any]:
-    if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
-        with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
-            numbers = values.real.astype(np.float32)
-        return _pack({"type": "float"}, numbers, ~np.isnan(numbers))
-    if values.dtype.kind in "iub":
-        return _pack({"type": "integer"}, values.astype(np.int32), values != 0)
-    # No array of texts, which gives each the room of the longest one.
-    places, words = pd.factorize(np.where(values == "", None, values.astype(object)).ravel(), sort=True)
-    places = places.astype(np.int32).reshape(values.shape)
-    return _pack({"type": "text", "words": [*map(str, words)]}, places, places >= 0)
-
-
-def _pack(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> dict[str, Any]:
+def _pack(values: np.ndarray) -> dict[str, Any]:
     """Pack an array: its bytes and how to read them."""
+    row: dict[str, Any] = {"type": "integer"}
+    if values.dtype.kind not in "iubf":
+        # No array of texts, which gives each the room of the longest one.
+        places, words = pd.factorize(np.where(values == "", None, values.astype(object)).ravel(), sort=True)
+        row, values = {"type": "text", "words": ["", *map(str, words)]}, places.reshape(values.shape) + 1
+    elif values.dtype.kind == "f" or values.size and max(-int(values.min()), int(values.max())) >= 2**31:
+        row = {"type": "float"}
+    with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
+        values = values.astype(np.float32 if row["type"] == "float" else np.int32)
     long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
     points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
-    numbers = values.reshape(-1, points)
-    row["points"], head = points, b""
+    bits, head, row["points"] = values.reshape(-1, points), b"", points
     if long:
-        kept = present.reshape(-1, points).any(axis=1)
-        row["kept"], head, numbers = int(kept.sum()), np.packbits(kept, bitorder="little").tobytes(), numbers[kept]
+        kept = (~np.isnan(bits) if row["type"] == "float" else bits != 0).any(axis=1)
+        row["kept"], head, bits = int(kept.sum()), np.packbits(kept, bitorder="little").tobytes(), bits[kept]
     if row["type"] == "float":
         row["cleared"] = LINE_BITS_CLEARED if points > 1 else CELL_BITS_CLEARED
-        numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)  # all NaN are equal
-        bits = numbers.view(np.int32).copy()
-        bits[np.isfinite(numbers)] += 1 << (row["cleared"] - 1)
+        finite = np.isfinite(bits)
+        bits = np.where(np.isnan(bits), np.float32(np.nan), bits).view(np.int32)  # all NaN are equal
+        bits[finite] += 1 << (row["cleared"] - 1)
         bits >>= row["cleared"]
-    else:
-        bits = np.ascontiguousarray(numbers)
     if points > 1:
         # Integer differences wrap around, as they do in the page.
         bits = np.diff(bits, axis=1, prepend=np.int32(0))

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from springtune.problem.quantities import nearest
+from springtune.problem.quantities import Status, nearest
 
-from .dataset import NOT_REQUESTED, as_words, flag_words, is_flagged
+from .dataset import as_words, is_flagged, records
 from .text import NUMBER, from_json, without_numbers
 
 RELATIVE_TOLERANCE = 1e-6  # default relative tolerance
@@ -214,14 +214,10 @@ def _why_unlike(one: xr.DataArray, other: xr.DataArray) -> str:
 def _cells_of_one(asked: Arrays, dimensions: set[str], most: int | None) -> tuple[CellsOfOne, ...]:
     """Cells that only one side requests, for each side."""
     masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
-    alone = []
-    for mask, other in zip(masks, masks[::-1]):
-        # On the labels of one side: the union of all may be the square of either.
-        there = other.reindex_like(mask, fill_value=False).transpose(*mask.dims).values
-        places = np.flatnonzero(mask.values & ~there)
-        rows = [_labels(mask, np.unravel_index(place, mask.shape)) for place in places[:most]]
-        alone.append(CellsOfOne(len(places), rows))
-    return tuple(alone)
+    # On the labels of one side: the union of all may be the square of either.
+    alone = (mask & ~other.reindex_like(mask, fill_value=False) for mask, other in zip(masks, masks[::-1]))
+    found = (records(xr.Dataset(), cells, ()) for cells in alone)
+    return tuple(CellsOfOne(len(rows), rows[:most]) for rows in found)
 
 
 def _compare_variable(
@@ -237,7 +233,7 @@ def _compare_variable(
     texts = flagged or one.dtype.kind in "OUS"
     a, b = (as_words(side) if flagged else side.values for side in (one, other))
     if flagged:
-        a, b = (np.where(side == NOT_REQUESTED, "", side) for side in (a, b))
+        a, b = (np.where(side == str(Status.NOT_REQUESTED), "", side) for side in (a, b))
     of_both = [mask.any([dim for dim in mask.dims if dim not in names]).broadcast_like(one) for mask in asked]
     masks = [mask.transpose(*names).values for mask in of_both]
     points = math.prod(one.sizes[name] for name in names if name not in dimensions)
@@ -283,9 +279,7 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray:
     status = next((one["status"] for one in (data, root) if "status" in one.data_vars), None)
     if status is None:
         return xr.DataArray(True)
-    words = flag_words(status) if is_flagged(status) else {0: NOT_REQUESTED}
-    silent = [value for value, word in words.items() if word == NOT_REQUESTED]
-    mask = ~status.reset_coords(drop=True).isin([*silent, np.nan]).compute()
+    mask = (status.reset_coords(drop=True) > Status.NOT_REQUESTED).compute()
     mask = mask.any([name for name in mask.dims if name not in data.dims])
     return mask.reindex({name: data.indexes[name] for name in mask.dims}, fill_value=False)
 

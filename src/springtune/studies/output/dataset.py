@@ -119,6 +119,8 @@ class Group:
         return replace(self, variables=variables)
 
 
+MESH_DIMENSIONS = ("beam", "mesh_type", "mesh_size")
+
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 NO_NODE = EMPTY_VALUES["no node"]  # fill value of UGRID connectivities
@@ -247,8 +249,6 @@ def _attributes(stored: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
 
 
 # -- flags -------------------------------------------------------------------------------------------------------------
-
-NOT_REQUESTED = "not_requested"
 
 
 def is_flagged(array: xr.DataArray) -> bool:
@@ -421,15 +421,12 @@ def network(data: xr.DataTree, labels: dict[str, Label]) -> xr.Dataset:
     swept = [name for name in SWEPT if f"{SHOWN_PREFIX}{name}" in fields]
     asked = {name: labels.pop(name) for name in swept if name in labels}
     fields = fields.drop_vars(swept, errors="ignore")
-    meshes = ("beam", "mesh_type", "mesh_size")
-    for name, label in labels.items():
-        if name not in fields.indexes:
-            known = ", ".join(map(str, fields.indexes))
-            raise ValueError(f"there is no dimension '{name}' to choose of; known: {known}")
-        if name not in meshes and label not in fields[name].values.tolist():
-            raise ValueError(f"nothing has {name} {label!r}; there is {_quoted(fields[name].values.tolist())}")
-    chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
-    found = fields.sel(labels | chosen).load()
+    for name in (name for name in labels if name not in fields.indexes):
+        known = ", ".join(map(str, fields.indexes))
+        raise ValueError(f"there is no dimension '{name}' to choose of; known: {known}")
+    others = {name: fields[name].values for name in labels if name not in MESH_DIMENSIONS}
+    present = fields.x.notnull().any("particle").expand_dims(others)
+    found = fields.sel(choose(present, **dict.fromkeys(MESH_DIMENSIONS) | labels)).load()
     for name in swept:
         kept = found[f"{SHOWN_PREFIX}{name}"]
         known = np.unique(kept.values[np.isfinite(kept.values)]).tolist()

@@ -17,7 +17,7 @@ from springtune.safe_io import check_folder, replacing, write_text
 from ...registry import how_to_install
 from . import reading
 from .answers import plane_vectors
-from .dataset import CELL_NODES, SPRING_NODES, as_words, cells, is_flagged
+from .dataset import CELL_NODES, MESH_DIMENSIONS, SPRING_NODES, as_words, cells, is_flagged
 from .text import cell_text
 
 TABLE_ENDINGS = (".csv", ".parquet")
@@ -69,8 +69,6 @@ def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False)
 
 
 # -- scenes in VTU files for ParaView ----------------------------------------------------------------------------------
-
-MESH_DIMENSIONS = ("beam", "mesh_type", "mesh_size")
 
 
 def write_scenes(tree: xr.DataTree, folder: Path) -> None:

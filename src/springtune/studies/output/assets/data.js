@@ -47,13 +47,13 @@ class Field {
     }
     const isFloat = this.type === "float";
     const numbers = isFloat ? new Float32Array(packed.map((one) => one << this.cleared).buffer) : packed;
-    const whole = new numbers.constructor(this.size).fill(isFloat ? NaN : this.isText ? -1 : 0);
+    const whole = new numbers.constructor(this.size).fill(isFloat ? NaN : 0);
     for (let row = 0, from = 0; row < rows; row++) {
       if (bitmap && !((bytes[row >> 3] >> (row & 7)) & 1)) continue;
       whole.set(numbers.subarray(from, from + points), row * points);
       from += points;
     }
-    return this.isText ? Array.from(whole, (one) => this.words[one] ?? "") : whole;
+    return this.isText ? Array.from(whole, (one) => this.words[one]) : whole;
   }
 
   get isEmpty() {
