@@ -16,9 +16,9 @@ from tables import beside, cases
 
 BEAM = st.Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {
-    "traction": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), "traction", 20e3),
-    "bending": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), "bending", 200.0),
-    "block": LoadedBeam(BEAM, st.Material(1e6, 0.49, 1000.0, "rubber"), "pressure", -10.0),
+    "traction": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), st.LOADS["traction"].kind, 20e3),
+    "bending": LoadedBeam(BEAM, st.Material(210e9, 0.3, 7850.0, "steel"), st.LOADS["bending"].kind, 200.0),
+    "block": LoadedBeam(BEAM, st.Material(1e6, 0.49, 1000.0, "rubber"), st.LOADS["pressure"].kind, -10.0),
 }
 CLOSE = beside(__file__)["CLOSE"]
 

@@ -21,10 +21,9 @@ def run(study: Study, folder: Path, output: Path) -> None:
     try:
         groups = groups_of_study(study, folder)
         dataset.write(output, groups, keys.origin(study))
-    except DamagedError as error:
-        job.forget_job_of(error.path, folder)
-        raise SystemExit(str(error)) from None
-    except OSError as error:
+    except (DamagedError, OSError) as error:
+        if isinstance(error, DamagedError):
+            job.forget_job_of(error.path, folder)
         raise SystemExit(str(error)) from None
     write_text(output.with_name(plan.SUMMARY), summary.text(groups, study.title))
 

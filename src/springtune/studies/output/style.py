@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import matplotlib
 import numpy as np
@@ -15,16 +15,17 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 from matplotlib.text import Text
 from matplotlib.ticker import NullLocator
 
 from springtune.problem.compare import sign_sentence
+from springtune.safe_io import no_mathematics
 
 from .answers import ERROR_COLOURS, ERROR_RANGE
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
     from springtune.mesh.cells import Mesh
@@ -89,8 +90,6 @@ LINE_STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#aa4488", "linestyle": (0, (3, 1.4, 1.2, 1.4, 1.2, 1.4)), "marker": "P"},
 )
 
-LOGARITHMIC = {"xscale": "log", "yscale": "log"}
-
 
 def line(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of a line by its number; colours repeat with other markers."""
@@ -98,9 +97,10 @@ def line(number: int) -> dict[str, Any]:
     return LINE_STYLES[(colour + 2 * turn) % len(LINE_STYLES)] | {"color": LINE_STYLES[colour]["color"]}
 
 
-def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
-    """Numbers such as 0.5, 2 and 300 in place of powers on a logarithmic axis."""
-    for name in axes:
+def logarithmic(panel: Axes) -> None:
+    """Make both axes logarithmic, with numbers such as 0.5, 2 and 300 in place of powers."""
+    panel.set(xscale="log", yscale="log")
+    for name in "xy":
         chosen, (low, high) = getattr(panel, f"{name}axis"), sorted(getattr(panel, f"get_{name}lim")())
         chosen.set_major_formatter(lambda value, _: f"{value:g}")
         if low <= 0 or high / low > 150:
@@ -379,19 +379,27 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
 # -- heat maps ---------------------------------------------------------------------------------------------------------
 
 
-def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
-    """Draw cells coloured by the size of an error [%], with texts; both have shape (n_rows, n_columns)."""
-    shade, (low, high) = np.log10(np.clip(np.abs(errors), *ERROR_RANGE)), np.log10(ERROR_RANGE)
+def heat_map(
+    panel: Axes, errors: "pd.DataFrame", asked: np.ndarray, starred: np.ndarray | bool = False, sign: str = ""
+) -> np.ndarray:
+    """Draw cells coloured by the size of an error [%], with row and column names; return the texts of the cells."""
+    texts, stars = np.where(asked, NO_RESULT, NOT_ASKED).astype(object), np.broadcast_to(starred, errors.shape)
+    for place in zip(*np.nonzero(np.isfinite(errors.values))):
+        texts[place] = error_text(errors.values[place], sign) + "*" * int(stars[place])
+    shade, (low, high) = np.log10(np.clip(np.abs(errors.values), *ERROR_RANGE)), np.log10(ERROR_RANGE)
     colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
-    image = panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
+    panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
     for (row, column), text in np.ndenumerate(texts):
         colour = "white" if shade[row, column] > 1.2 else "0.5" if text == NOT_ASKED else "k"
         panel.text(column, row, text, ha="center", va="center", fontsize=SMALL_TEXT, color=colour)
+    panel.set_xticks(range(errors.shape[1]), map(no_mathematics, errors.columns), rotation=90)
+    panel.set_yticks(range(len(errors)), map(no_mathematics, errors.index))
+    panel.tick_params(length=0)
     panel.grid(False)
-    return image
+    return texts
 
 
-def error_text(error: float, sign: str = "+") -> str:
+def error_text(error: float, sign: str) -> str:
     """Format an error [%] for a cell of a heat map."""
     size = abs(error)
     return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")

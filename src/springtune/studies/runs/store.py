@@ -146,12 +146,13 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
                 if isinstance(value, np.ndarray) and value.ndim:
                     stacks.setdefault((label, value.shape, value.dtype), []).append((name, value))
                 else:
-                    scalars[name][label] = value.item() if isinstance(value, np.generic | np.ndarray) else value
+                    scalars[name][label] = value
         for (label, _, _), members in stacks.items():
             stack = f"{label}_{len(file)}"
             places |= {name: places[name] | {label: (stack, row)} for row, (name, _) in enumerate(members)}
             _put(file, stack, np.stack([value for _, value in members]))
-        content = json.dumps([LAYOUT, Path(path).name, scalars, places]).encode()
+        numbers = [LAYOUT, Path(path).name, scalars, places]
+        content = json.dumps(numbers, default=lambda value: value.tolist()).encode()  # of numpy
         _put(file, SCALARS, np.frombuffer(content, np.uint8)[np.newaxis])
     write_bytes(path, image.getvalue())
 

@@ -82,8 +82,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
         panel.plot([seconds], [estimate], "*", color="black", markersize=7, label="the reference")
-    panel.set(**style.LOGARITHMIC)
-    style.plain(panel, "x", "y")
+    style.logarithmic(panel)
     style.add_legend(panel, [lost])
     return panel
 

@@ -127,15 +127,13 @@ def _axes(scenes):
 
 def _tasks(study):
     for name, values in study.parts["benchmark"].items():
-        yield Task(values, _code_keys(values["approaches"]), {"scene": name}, name=name)
-
-
-def _code_keys(approaches):
-    pairs = [approach.split("/") for approach in approaches if "/" in approach]
-    # What the approaches do not name is solved and timed on these.
-    definitions, mesh_types = zip(("delingette", "structured"), ("lattice", "structured"), *pairs)
-    springs, meshes = map(definition_key, sorted({*definitions})), map(mesh_type_key, sorted({*mesh_types}))
-    return [*springs], [*meshes], program() if any(name.startswith("calculix") for name in approaches) else ""
+        approaches = values["approaches"]
+        pairs = [approach.split("/") for approach in approaches if "/" in approach]
+        # What the approaches do not name is solved and timed on these.
+        definitions, mesh_types = zip(("delingette", "structured"), ("lattice", "structured"), *pairs)
+        springs, meshes = map(definition_key, sorted({*definitions})), map(mesh_type_key, sorted({*mesh_types}))
+        other = program() if any(name.startswith("calculix") for name in approaches) else ""
+        yield Task(values, ([*springs], [*meshes], other), {"scene": name}, name=name)
 
 
 def _figures(study):

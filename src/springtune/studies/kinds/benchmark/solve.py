@@ -19,7 +19,7 @@ from springtune.mesh.cells import MESH_TYPES
 from springtune.mesh.rows import structured
 from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import assured, deformation_error
-from springtune.problem.loads import LOADS
+from springtune.problem.loads import LOADS, LoadKind
 from springtune.problem.materials import Material, material_of
 from springtune.problem.quantities import Status
 from springtune.problem.shapes import Beam
@@ -48,7 +48,7 @@ def failed(task, why):
 
 def solve(task):
     """Measure errors and seconds of a scene."""
-    scene = LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
+    scene = LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), LOADS[task["load"]].kind, task["force"])
     rows = measure(scene, list(cases(**task)), task["most_seconds"])
     return {"rows": [*rows, *(explicit(scene, task["mesh_sizes"]) if task["explicit"] else ())]}
 
@@ -67,13 +67,8 @@ class LoadedBeam:
 
     beam: Beam
     material: Material
-    load: str
+    kind: LoadKind
     force: float
-
-    @property
-    def kind(self):
-        """Kind of the load."""
-        return LOADS[self.load].kind
 
     @property
     def side(self):
@@ -427,12 +422,10 @@ def free_form(scene, size, clock):
 def calculix_cps3(scene, size, clock):
     """Solve by CalculiX with linear triangles on the same mesh."""
     mesh = _mesh(scene, size, clock)
-    load = scene.force * weights(mesh, scene.kind)
+    load, clamp = scene.force * weights(mesh, scene.kind), held(mesh, scene.kind)
     with clock("solving"):
-        found = calculix.solve(
-            mesh.points, mesh.triangles, "CPS3", scene.material, scene.beam.thickness, load, held(mesh, scene.kind)
-        )
-    return float(np.tensordot(found, measured(mesh, scene.kind), axes=2)), int((~held(mesh, scene.kind)).sum())
+        found = calculix.solve(mesh.points, mesh.triangles, "CPS3", scene.material, scene.beam.thickness, load, clamp)
+    return float(np.tensordot(found, measured(mesh, scene.kind), axes=2)), int((~clamp).sum())
 
 
 def calculix_cps8(scene, size, clock):
@@ -453,14 +446,7 @@ def calculix_cps8(scene, size, clock):
     return float(moved @ shares), int((~clamp).sum())
 
 
-APPROACHES = {
-    "linear-triangles": partial(triangles, degree=1),
-    "quadratic-triangles": partial(triangles, degree=2),
-    "tensor-mass": tensor_mass,
-    "condensation": condensation,
-    "boundary-elements": boundary_elements,
-    "free-form": free_form,
-    "calculix-cps3": calculix_cps3,
-    "calculix-cps8": calculix_cps8,
-}
+LINEAR_SOLVES = tensor_mass, condensation, boundary_elements, free_form, calculix_cps3, calculix_cps8
+APPROACHES = {one.__name__.replace("_", "-"): one for one in LINEAR_SOLVES}
+APPROACHES |= {f"{name}-triangles": partial(triangles, degree=n) for n, name in enumerate(("linear", "quadratic"), 1)}
 """Approaches besides definitions, by their names in `OTHER_APPROACHES`."""

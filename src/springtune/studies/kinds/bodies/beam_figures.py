@@ -27,7 +27,6 @@ from ...output.dataset import (
     own_laws,
     sign_of_errors,
 )
-from ...output.style import BEYOND_SMALL_STRAIN
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .shape_figures import draw_network, extent, magnification
 from .tables import own_references
@@ -92,9 +91,8 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     '|Deformation error| [%]'
     """
     curves = group(data, "sensitivity")
-    selection = choose(
-        curves.status != 0, beam=beam, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics
-    )
+    asked = curves.status != 0
+    selection = choose(asked, beam=beam, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics)
     curves, root = curves.sel(selection), group(data, "/")
     values = last_swept(curves.status != 0)
     curves, root = at(curves, values), at(root.sel(selection), values) if "reference_displacement" in root else None
@@ -159,7 +157,7 @@ LEGEND = {
     "unstable": ("thin: unstable", {"linewidth": 0.5}),
     "not converged": ("gap: not converged", {"linestyle": ""}),
     "failed": ("gap: failed", {"linestyle": ""}),
-    "beyond": (BEYOND_SMALL_STRAIN, {"linestyle": ""}),
+    "beyond": (style.BEYOND_SMALL_STRAIN, {"linestyle": ""}),
 }
 """Entries in the legend of a sensitivity figure, each shown where it occurs."""
 
@@ -186,12 +184,9 @@ def _reason_without_curve(curves):
 
 def swept_words(values):
     """Values of swept parameters for a title."""
-    found = []
-    for name, value in values.items():
-        ends = list(dict.fromkeys((float(value.min()), float(value.max()))))
-        if (name, ends) != ("stiffness_scale", [1.0]):
-            found.append(" to ".join(with_unit(name, end) for end in ends))
-    return found
+    ends = {name: [*dict.fromkeys((float(value.min()), float(value.max())))] for name, value in values.items()}
+    shown = {name: own for name, own in ends.items() if (name, own) != ("stiffness_scale", [1.0])}
+    return [" to ".join(with_unit(name, end) for end in own) for name, own in shown.items()]
 
 
 def _beam_title(root, name, values):
@@ -286,15 +281,9 @@ def plot_deformed(
     kept = fields.definition.values.tolist()
     definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
     cut, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
-    fields = fields.sel({"definition": definition, "mesh_type": selection["mesh_type"]})
-    if "kinematics" in fields.dims:
-        fields = fields.sel(kinematics=selection["kinematics"])
-    cut = cut.sel(definition=definition)
+    fields = fields.sel(selection | {"definition": definition})
     values = _shown_swept(fields, root)
-    chosen = {one: selection[one] for one in ("material", "load")}
-    values = {name: value.sel(chosen) for name, value in values.items()}
-    cut = at(cut, values)
-    fields = fields.sel(chosen)
+    cut = at(cut.sel(definition=definition), values)
     shown = {_beam_title(root, name, values): (fields.sel(beam=name), cut.sel(beam=name)) for name in beams}
     extents = [extent(plane_vectors(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
     height = max(float(np.clip((style.PAGE_WIDTH - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
@@ -325,9 +314,7 @@ def _draw_deformed(panel, part):
     draw_network(panel, here, scale)
     text = f"{panel.get_title('left')}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
     panel.set_title(style.wrap_to_panel(panel, [text], 8))
-    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
-    panel.grid(False)
-    beyond = [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
+    beyond = [f"reference {style.BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
     notes = beyond if here.reference_displacement_x.notnull().any() else ["no reference"]
     if not here.displacement_x.notnull().any():
         notes.append(f"no network: {status_words(flag) or 'not asked for'}" if flag != 1 else "no network stored")
@@ -343,9 +330,8 @@ MOST_DEFINITIONS_IN_PANEL = 6  # most definitions in one panel
 
 def _draw_panels(ax, root, selection, beams, draw):
     """Draw deformation errors of beams by their titles; `draw` gets a panel, errors and line styles; returns notes."""
-    looks, shown = {}, {}
-    for number, name in enumerate(labels_of(root.status != 0, "definition")):
-        looks[name] = style.line(number)
+    shown, names = {}, labels_of(root.status != 0, "definition")
+    looks = {name: style.line(number) for number, name in enumerate(names)}
     for words, here in beams.items():
         asked = labels_of(here.status != 0, "definition")
         parts = np.array_split(asked, -(-len(asked) // MOST_DEFINITIONS_IN_PANEL))
@@ -379,7 +365,7 @@ def _draw_lines(panel, places, here, looks, listed, gaps):
         hollow = look | {"linestyle": "", "markerfacecolor": "white", "markersize": 4.5, "zorder": 4}
         panel.plot(x[doubtful], error[doubtful], **hollow)
         doubts |= {status_words(flag) for flag in flags[doubtful] if flag > 1}
-        doubts |= {BEYOND_SMALL_STRAIN} if (known & beyond).any() else set()
+        doubts |= {style.BEYOND_SMALL_STRAIN} if (known & beyond).any() else set()
         for place, flag in zip(np.flatnonzero(~known), flags[~known]):
             if flag:
                 lost.setdefault("no reference" if flag == 1 else status_words(flag), []).append(place)
@@ -720,20 +706,18 @@ def _draw_pressed_face(panel, block, root, load):
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")
     law = _own_law_reference(pressed, "reference_face_profile")
-    finite = bool(law) and bool(
-        pressed.reference_face_profile.sel(reference=law).notnull().any()
-        and solved.sel(kinematics=solved.kinematics != "linear").any()
-    )
+    references, nonlinear = pressed.reference_face_profile, solved.sel(kinematics=solved.kinematics != "linear")
+    finite = bool(law and references.sel(reference=law).notnull().any() and nonlinear.any())
     panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)")
     kind = law if finite else str(block.reference.values[0])
-    profiles = {f"reference, {kind.replace('-', ' ')}": pressed.reference_face_profile.sel(reference=kind)}
+    profiles = {f"reference, {kind.replace('-', ' ')}": references.sel(reference=kind)}
     asked = labels_of(root.status.sel(load=[load]) != 0, "definition")
     for definition in sorted(asked, key=lambda name: (name not in FACES_SHOWN_FIRST, asked.index(name))):
         usual = [one for one in (("nonlinear",) if finite else ("linear", "nonlinear")) if one in solved.kinematics]
         drawn = [one for one in usual if solved.sel(definition=definition, kinematics=one)]
         if drawn and len(profiles) <= MOST_FACES:
-            profile = pressed.face_profile.sel(definition=definition, kinematics=drawn[0])
-            profiles[f"{definition}, {drawn[0]}"] = profile
+            own = pressed.face_profile.sel(definition=definition, kinematics=drawn[0])
+            profiles[f"{definition}, {drawn[0]}"] = own
         else:
             flags = root.status.sel(load=load, definition=definition, kinematics=usual).values
             said.append(f"{definition}: {'in the dataset' if drawn else status_words(flags) or 'not asked for'}")

@@ -17,7 +17,7 @@ from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.model import Reference, Study, declared_variables, keeps_fields
+from ...config.model import Reference, Study, declared_dimensions, declared_variables, keeps_fields
 from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING_ATTRIBUTES, UGRID, Group
 from ...runs import store
 from . import any_reference, stored
@@ -37,29 +37,19 @@ DIMENSIONS |= {"SHAPE_MESH": MESH_AXES, "SHAPE_CASE": CASE_AXES, "SHAPE_SCENE": 
 """Dimensions that the file gives one name."""
 
 
-def declared(group: str, **options: Any) -> Group:
-    """Group of the dataset with its variables from the file."""
-    return Group(group, declared_variables(__file__, group, **DIMENSIONS), **options)
+def declared(group: str, **further: Any) -> Group:
+    """Group of the dataset with its variables and dimensions from the file, and `further` attributes."""
+    variables = declared_variables(__file__, group, **DIMENSIONS)
+    return Group(group, variables, declared_dimensions(__file__), {"applies": ("no", "yes")}, further)
 
 
-YES_OR_NO = {"applies": ("no", "yes")}
-MESH_ATTRIBUTES = (
-    UGRID
-    | dict.fromkeys(("displacement_x", "displacement_y"), PARTICLE_ATTRIBUTES)
-    | {"spring_force": SPRING_ATTRIBUTES}
-)
-KIND_OF_REFERENCE = {"reference": "kind of reference"}
+MESH_ATTRIBUTES = UGRID | dict.fromkeys(("spring_force", "stiffness"), SPRING_ATTRIBUTES)
+MESH_ATTRIBUTES |= {f"displacement_{axis}": PARTICLE_ATTRIBUTES for axis in "xy"}
+MESH_ATTRIBUTES |= {f"particle_reference_{axis}": PARTICLE_ATTRIBUTES for axis in "xy"}
 
-ROOT = declared("/", flags=YES_OR_NO)
-SENSITIVITY = declared("/sensitivity", dimensions={"stiffness_ratio": "uniform stiffness over E t"})
-FINITE_STRAIN = declared("/finite_strain", dimensions=KIND_OF_REFERENCE)
-BLOCK = declared("/block", dimensions=KIND_OF_REFERENCE | {"face_position": "place on the loaded face over its length"})
-FIELDS = declared(
-    "/fields",
-    further=MESH_ATTRIBUTES
-    | dict.fromkeys(("particle_reference_x", "particle_reference_y"), PARTICLE_ATTRIBUTES)
-    | {"stiffness": SPRING_ATTRIBUTES},
-)
+ROOT, SENSITIVITY = declared("/"), declared("/sensitivity")
+FINITE_STRAIN, BLOCK = declared("/finite_strain"), declared("/block")
+FIELDS = declared("/fields", **MESH_ATTRIBUTES)
 """Whole fields of the coarsest mesh of each beam and mesh type, by UGRID-1.0 without the padding of its arrays.
 
 The force of springs is not called "force", a dimension of the root where a study sweeps it.
@@ -70,19 +60,9 @@ MIXED_UNITS: dict[str, object] = {
     "units_variable": "quantity_units",
 }
 
-SHAPES = declared(
-    "/shapes",
-    dimensions={"shape": "shape, by name", "quantity": "quantity of interest, by name"},
-    flags=YES_OR_NO,
-    further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED_UNITS),
-)
-AT_FINITE_STRAIN = declared(
-    "/shapes_finite_strain",
-    dimensions=SHAPES.dimensions
-    | {"law": "law at finite strain: that of the material, or of St. Venant and Kirchhoff"},
-    further={"reference_value": MIXED_UNITS},
-)
-SHAPE_FIELDS = declared("/shape_fields", dimensions={"case": "shape and load"}, further=MESH_ATTRIBUTES)
+SHAPES = declared("/shapes", value=MIXED_UNITS, reference_value=MIXED_UNITS, expected_value=MIXED_UNITS)
+AT_FINITE_STRAIN = declared("/shapes_finite_strain", reference_value=MIXED_UNITS)
+SHAPE_FIELDS = declared("/shape_fields", **MESH_ATTRIBUTES)
 """Networks to draw: of each shape and load on one mesh, displacements and forces with seven digits."""
 
 PRINTED_PREFIX = "paper_"  # prefix of variables of printed cells, which have no swept dimensions
@@ -105,10 +85,9 @@ def swept(group: Group, study: Study) -> Group:
 
 def fields_of(study: Study) -> Group:
     """Group of whole fields, which are stored for one value of each swept parameter: the group says which."""
-    place, variables = ("beam", "mesh_type", "material", "load"), {}
-    for name in study.swept:
-        variables[f"{SHOWN_PREFIX}{name}"] = place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan
-    return replace(FIELDS, variables=FIELDS.variables | variables)
+    place, named = ("beam", "mesh_type", "material", "load"), {name: SWEPT[name] for name in study.swept}
+    own = {SHOWN_PREFIX + name: (place, unit, f"{text}, of the fields", np.nan) for name, (text, unit) in named.items()}
+    return replace(FIELDS, variables=FIELDS.variables | own)
 
 
 # -- rows --------------------------------------------------------------------------------------------------------------
@@ -269,7 +248,7 @@ def _scene_rows(study, folder, answers):
         results = store.read(path, set(keys), ["face_profile"] if pressed(study) else [])
         kept = {fields_key(key) for task, key in zip(tasks, keys) if keeps_fields(study) and "keep_fields" in task}
         arrays = store.read(path, kept, [*FIELD_ARRAYS]) if kept else {}
-        for scene, key in zip(bodies.scenes_by_mesh(study)[mesh], keys):
+        for scene, key in zip(bodies.by_mesh(study, "scenes")[mesh], keys):
             result, labels = results[key], study.labels(scene)
             against = objections[*(labels[name] for name in names), scene.kinematics]
             message = _with_objection(result, result.get("message", ""), against)
@@ -291,7 +270,7 @@ def _printed_rows(study):
 
 
 def _curve_rows(study, folder, answers):
-    for mesh, curves in bodies.curves_by_mesh(study).items():
+    for mesh, curves in bodies.by_mesh(study, "curves").items():
         tasks = [bodies.curve_task(study, curve) for curve in curves]
         path = folder / "curves" / f"{bodies.stem(mesh)}.h5"
         results = store.read(path, [task["key"] for task in tasks], ["displacement", "stable"])

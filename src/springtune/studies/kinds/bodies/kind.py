@@ -3,7 +3,6 @@
 Stages, tasks and keys; `stored` reads what the stages store, and `collect` makes rows for the groups of the dataset.
 """
 
-import hashlib
 from collections import Counter, defaultdict
 from functools import cache, lru_cache
 from math import ceil, floor, log10
@@ -23,7 +22,7 @@ from ...config.model import SceneSpec, Stage, Study, StudyKind, cache_by_study, 
 from ...runs import attempts
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task
-from ...runs.source import hash_of, hash_of_text
+from ...runs.source import checksum, hash_of, hash_of_text
 from . import shapes as of_shapes
 from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, mesh_name, stems
 from .stored import CALIBRATION_STEM
@@ -56,15 +55,9 @@ def group_by(items, key):
 
 
 @cache_by_study
-def scenes_by_mesh(study):
-    """Scenes of a study by their mesh."""
-    return group_by(study.scenes, attrgetter("mesh"))
-
-
-@cache_by_study
-def curves_by_mesh(study):
-    """Sensitivity curves of a study by their mesh."""
-    return group_by(study.curves, attrgetter("mesh"))
+def by_mesh(study, name):
+    """The ``scenes`` or ``curves`` of a study by their mesh."""
+    return group_by(getattr(study, name), attrgetter("mesh"))
 
 
 @cache_by_study
@@ -128,11 +121,14 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
 
 # -- keys --------------------------------------------------------------------------------------------------------------
 
+FINITE_STRAIN = "reference.finite_shapes", "reference.finite_strain"  # modules of references at finite strain
+TASK_VALUES = "studies.kinds.bodies.task_values"  # module of shapes, which stages import for them alone
+
 
 @cache
 def mesh_key(mesh):
     """Key of the mesh of a beam."""
-    code = stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
+    code = stage_key("studies.kinds.bodies.mesh", without=(TASK_VALUES,))
     return hash_of(parameters(mesh_source(mesh)), code, mesh_type_key(mesh.mesh_type))
 
 
@@ -143,10 +139,9 @@ def parameters(source):
 
 def mesh_source(mesh):
     """Parameters to make the mesh of a beam, from a box and mesh size or from a file."""
-    source = {"length": mesh.beam.length, "height": mesh.beam.height}
-    if mesh.file is None:
-        return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
-    return source | file_source(mesh.file, mesh.unit)
+    made = {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+    made = file_source(mesh.file, mesh.unit) if mesh.file else made
+    return {"length": mesh.beam.length, "height": mesh.beam.height} | made
 
 
 def file_source(file, unit):
@@ -158,7 +153,7 @@ def file_source(file, unit):
 @lru_cache(maxsize=256)
 def _content(file, size, time):
     """Hash of a file; cached by its state, since each scene asks."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    return checksum(file)
 
 
 @cache
@@ -177,10 +172,7 @@ def reference_of(study, *body):
     return solved | ({"interpolant": interpolant_key(name, box), "problem": problems[body]} if body in problems else {})
 
 
-REFERENCES_OF_SHAPES = (
-    "studies.kinds.bodies.task_values",
-    *("mesh.sheets", "reference.shapes", "reference.finite_shapes"),
-)
+REFERENCES_OF_SHAPES = (TASK_VALUES, "mesh.sheets", "reference.shapes", "reference.finite_shapes")
 """Modules that the stage `reference` imports, but references of beams do not call."""
 
 
@@ -189,10 +181,7 @@ def _reference_code(*without):
     return stage_key("studies.kinds.bodies.reference", without=(*REFERENCES_OF_SHAPES, *without))
 
 
-NOT_OF_BEAMS = (
-    "studies.kinds.bodies.task_values",
-    *(f"reference.{name}" for name in ("small_strain", "shapes", "finite_shapes", "finite_strain")),
-)
+NOT_OF_BEAMS = (TASK_VALUES, "reference.small_strain", *FINITE_STRAIN, "reference.shapes")
 """Modules that the stage `solve` imports, but scenes of beams do not call."""
 
 
@@ -231,7 +220,7 @@ def finite_problem(reference, kind):
 @cache_by_study
 def scene_tasks(study):
     """Tasks of a study's scenes by mesh; `stored.stored_key` adds the calibrated stiffness to their keys."""
-    return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in scenes_by_mesh(study).items()}
+    return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in by_mesh(study, "scenes").items()}
 
 
 def _scene_tasks(study, mesh, scenes):
@@ -322,8 +311,6 @@ MOST_PARTICLES_DRAWN = 1500
 
 FILE_PARTICLES = 2000.0  # assumed number of particles of a mesh file, for expected seconds
 
-WITHOUT_FINITE_STRAIN = ("reference.finite_shapes", "reference.finite_strain")
-
 
 def shape_stem(one):
     """Stem of the files of a scene of a shape."""
@@ -394,14 +381,14 @@ def shape_reference_task(study, shape, material, name, law=""):
     """Task of a reference of small strain, or of a law at finite strain."""
     body = study.shape(shape)
     task = {"shape": shape_source(body)} | _case_values(study, shape, material, name) | ({"law": law} if law else {})
-    without = "reference.interpolant", *(() if law else WITHOUT_FINITE_STRAIN)
+    without = "reference.interpolant", *(() if law else FINITE_STRAIN)
     code = stage_key("studies.kinds.bodies.reference", attempts.MODULE, without=without), _reader_key(body)
     return {"key": hash_of(task | {"shape": parameters(task["shape"])}, code)} | task
 
 
 def shape_scene_task(study, one):
     """Task of a scene of a shape."""
-    code = stage_key("studies.kinds.bodies.solve", without=WITHOUT_FINITE_STRAIN), definition_key(one.definition)
+    code = stage_key("studies.kinds.bodies.solve", without=FINITE_STRAIN), definition_key(one.definition)
     task = _case_values(study, one.shape, one.material, one.load)
     task = {**task, "definition": one.definition, "kinematics": one.kinematics}
     kept = SHAPES_OUTPUT in study.outputs and one in drawn_scenes(study)
@@ -420,8 +407,8 @@ def _mesh_task(name, source, key, particles, scenes, curves=(), meshing=0.0):
 
 
 def _mesh_tasks(study):
-    curves = curves_by_mesh(study)
-    for mesh, scenes in scenes_by_mesh(study).items():
+    curves = by_mesh(study, "curves")
+    for mesh, scenes in by_mesh(study, "scenes").items():
         count, own = particles(mesh.beam.length * mesh.beam.height, mesh.mesh_size), curves.get(mesh, ())
         yield _mesh_task(stem(mesh), mesh_source(mesh), mesh_key(mesh), count, scenes, own)
     for name, scenes in shape_scenes_by_mesh(study).items():

@@ -105,13 +105,12 @@ def _of_scenes(name: str) -> Callable[[Study], dict[str, dict[str, str]]]:
 SceneOutput = partial(Output, job="scenes", usual=True)
 
 OUTPUTS = (
-    Output(
+    SceneOutput(
         "sensitivity",
         "sensitivity curves",
-        figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, map(study.labels, study.curves)),
+        lambda study: distinct("sensitivity", SENSITIVITY_LABELS, map(study.labels, study.curves)),
         plot=f"{PLOTS}:sensitivity",
         job="sensitivity",
-        usual=True,
     ),
     SceneOutput("size", "errors against mesh size", _of_scenes("size"), plot=f"{PLOTS}:size"),
     SceneOutput(

@@ -38,23 +38,24 @@ def failed(task, why):
     return {"message": why, "seconds": 0.0}
 
 
-def solve(task):
+def solve(task, **options):
     """Result of a unit problem, at finite strain, or of a shape."""
     begin = time.perf_counter()
-    solve_task = _solve_shape if "shape" in task else _solve_finite_strain if "law" in task else solve_unit_problem
-    return solve_task(task) | {"seconds": time.perf_counter() - begin}
+    solve_task = _solve_shape if "shape" in task else _solve_finite_strain if "law" in task else _solve_unit_problem
+    try:
+        found = solve_task(task, **options)
+    except ReferenceNotConvergedError as error:
+        found = {"message": str(error)}
+    return found | {"seconds": time.perf_counter() - begin}
 
 
 # -- beams -------------------------------------------------------------------------------------------------------------
 
 
-def solve_unit_problem(task, fields=True):
+def _solve_unit_problem(task, fields=True):
     """Result of a unit problem, with whole fields or without."""
     aspect_ratio, nu, kind = task["problem"]
-    try:
-        solution = solve_unit(aspect_ratio, nu, LOAD_KINDS[kind])
-    except ReferenceNotConvergedError as error:
-        return {"message": str(error)}
+    solution = solve_unit(aspect_ratio, nu, LOAD_KINDS[kind])
     names = ["displacement", "mean_displacement", "error_estimate", "rotation", "strain"]
     names += ["x", "y", "displacements"] if fields else []
     return {name: getattr(solution, name) for name in names} | {"message": ""}
@@ -62,7 +63,7 @@ def solve_unit_problem(task, fields=True):
 
 def _solve_finite_strain(task):
     # Here, since few studies need it.
-    from springtune.reference.finite_strain import FiniteStrainError, solve_finite_strain
+    from springtune.reference.finite_strain import solve_finite_strain
 
     beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
     if material.plane == "strain" and task["plane"] == "stress":
@@ -70,10 +71,7 @@ def _solve_finite_strain(task):
     tested = isinstance(material, Rubber)
     if tested != (task["law"] == "yeoh"):
         return {"message": f"material {WITH_TEST if tested else WITHOUT_TEST}"}
-    try:
-        solution = solve_finite_strain(beam, material, task["force"], kind, task["plane"], task["follower"])
-    except FiniteStrainError as error:
-        return {"message": str(error)}
+    solution = solve_finite_strain(beam, material, task["force"], kind, task["plane"], task["follower"])
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
 
@@ -94,12 +92,9 @@ def make_interpolant(path, task, attempts):
     # Those that share elements follow each other.
     with store.ResultBuffer(path) as keeper:
         for key, problem in sorted(task["problems"].items(), key=lambda pair: pair[1]):
-            if key in known:
-                continue
-            begin = time.perf_counter()
-            unit = partial(solve_unit_problem, {"problem": (*problem, task["kind"])}, fields=False)
-            if result := attempts.attempt(key, unit, partial(failed, task)):
-                keeper[key] = result | {"seconds": time.perf_counter() - begin}
+            unit = partial(solve, {"problem": (*problem, task["kind"])}, fields=False)
+            if key not in known and (result := attempts.attempt(key, unit, partial(failed, task))):
+                keeper[key] = result
 
 
 def _build_interpolant(task):
@@ -154,9 +149,8 @@ def _solve_shape(task):
         "error_estimates": estimates,
         "lacking": {quantity_key(one): lacking[one.name] for one in case.quantities if one.name in lacking},
         "unknowns": max(int(one.unknowns) for one in found),
-        "energy": float(found[0].energy),
-        "rotation": float(found[0].rotation),
-        "strain": float(found[0].strain),
+        "rotation": found[0].rotation,
+        "strain": found[0].strain,
         "outline_points": points,
         "outline_displacements": found[0].at(points),
         "outline_lengths": np.array([len(one) for one in outlines]),

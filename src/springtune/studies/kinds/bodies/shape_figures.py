@@ -3,10 +3,9 @@
 import math
 
 import numpy as np
+import pandas as pd
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
-
-from springtune.safe_io import no_mathematics
 
 from ...output import style
 from ...output.answers import plane_vectors, status_words
@@ -127,9 +126,7 @@ def _error_variable(cut, name):
 def _draw_errors(panels, cut, name, points):
     """Draw the lines of a quantity over particles and over seconds."""
     one = cut.sel(quantity=name)
-    estimate, difference = (
-        100 * abs(float(one[f"reference_{error}"])) for error in ("error_estimate", "expected_error")
-    )
+    estimate, difference = (100 * abs(float(one[f"reference_{name}"])) for name in ("error_estimate", "expected_error"))
     for number, (definition, (*places, errors, counted)) in enumerate(points.items()):
         look = style.line(number)
         for panel, along in zip(panels, places):
@@ -147,7 +144,7 @@ def _draw_errors(panels, cut, name, points):
         if estimate > low:
             panel.axhspan(low, estimate, color="0.92", zorder=0)
             panel.set_ylim(low, None)
-        style.plain(panel, "x", "y")
+        style.logarithmic(panel)
     panels[1].set_ylabel("")
     style.add_legend(panels[1])
     panels[0].set_title(f"{name}: {described(cut, name)}")
@@ -197,21 +194,16 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     rows = _errors_by_quantity(whole, material, kinematics)
     known = {name for row in rows.values() for name in row}
     names = [name for name in (*whole.definition.values.tolist(), REFERENCE_COLUMN) if name in known]
-    errors = np.array([[row.get(name, np.nan) for name in names] for row in rows.values()]).reshape(len(rows), -1)
-    texts = [[style.NOT_ASKED if name not in row else
-              style.error_text(row[name], "") if np.isfinite(row[name]) else style.NO_RESULT
-              for name in names] for row in rows.values()]  # fmt: skip
+    errors = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=names)
+    asked = np.array([[name in row for name in names] for row in rows.values()])
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
-    if not np.isfinite(errors).any():
+    if not np.isfinite(errors.values).any():
         style.write_reason(panel, "No quantity has an error: see status and message.")
         return panel
-    style.heat_map(panel, errors, np.array(texts, dtype=object))
-    panel.set_yticks(range(len(rows)), list(map(no_mathematics, rows)))
-    panel.set_xticks(range(len(names)), list(map(no_mathematics, names)), rotation=90)
-    panel.tick_params(length=0)
+    texts = style.heat_map(panel, errors, asked)
     said = {style.NO_RESULT: "no result that counts", style.NOT_ASKED: "not asked for"}
-    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if any(mark in row for row in texts)))
+    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if (texts == mark).any()))
     return panel
 
 
@@ -266,6 +258,8 @@ NETWORK_LINE_WIDTH = 0.35  # width of the lines of springs that have one colour 
 
 def draw_network(panel, fields, scale, most=0.0, cmap=None):
     """Draw a deformed network, coloured up to `most` [N], over the outline of its reference and the one at rest."""
+    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
+    panel.grid(False)
     outline, there = plane_vectors(fields, "outline_{}"), plane_vectors(fields, "reference_displacement_{}")
     rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
     for number in range(int(rounds.max(initial=-1)) + 1):
@@ -279,7 +273,6 @@ def draw_network(panel, fields, scale, most=0.0, cmap=None):
     nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)
     kept = (nodes >= 0).all(axis=1)
     springs = moved[nodes[kept]]
-    panel.set(aspect="equal", adjustable="datalim")
     # One line with gaps a colour: thousands of lines take ten times as long.
     gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     if not most:
@@ -341,9 +334,8 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     cut = scenes.sel(about | mesh)
     asked = labels_of(cut.status != 0, "definition")
     wanted = [definition] if isinstance(definition, str) else definition or _choose_definitions(cut, asked)
-    missing = [name for name in wanted if name not in asked]
-    if missing:
-        raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
+    for name in wanted:
+        choose(cut.status != 0, definition=name)
     places = np.concatenate([plane_vectors(case, "{}"), plane_vectors(case, "outline_{}")])
     width, height = extent(places, (1.0, 1.0))
     columns = min(NETWORKS_IN_ROW, len(wanted))
@@ -362,7 +354,14 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     shown = {name: (networks.sel(definition=name), cut.sel(definition=name)) for name in wanted}
 
     def draw(panel, part):
-        return _draw_network(panel, *part, scale, most), ""
+        """Draw one network; return notes."""
+        one, state = part
+        lines = draw_network(panel, one, scale, most, FORCE_COLOURS)
+        notes = ["forces in an energy"] if lines is not None and not one.spring_force.fillna(0).any() else []
+        if STATUS[int(state.status)] != "solved":
+            message = f": {state.message.item()[:120]}" if lines is None else ""
+            notes.append(status_words(int(state.status)) + message)
+        return notes, ""
 
     flat = style.small_multiples(ax, shown, NETWORKS_IN_ROW, tall, ", ".join(said), draw, said=below)
     lines = [one for panel in flat for one in panel.collections]
@@ -379,15 +378,3 @@ def _choose_definitions(cut, asked):
     solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
     order = sorted(asked, key=lambda name: (not solved[name], name not in SHOWN_FIRST))
     return [name for name in asked if name in order[:MOST_NETWORKS]]
-
-
-def _draw_network(panel, one, state, scale, most):
-    """Draw one network; return notes."""
-    lines = draw_network(panel, one, scale, most, FORCE_COLOURS)
-    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
-    panel.grid(False)
-    notes = ["forces in an energy"] if lines is not None and not one.spring_force.fillna(0).any() else []
-    if STATUS[int(state.status)] != "solved":
-        message = f": {state.message.item()[:120]}" if lines is None else ""
-        notes.append(status_words(int(state.status)) + message)
-    return notes

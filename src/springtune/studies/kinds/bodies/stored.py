@@ -1,6 +1,5 @@
 """Reading and writing of stored meshes (VTU files with a stored result beside), references and scenes."""
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ def make_beam(source: dict[str, Any]) -> Mesh:
 
 def check_unchanged(source: dict[str, Any]) -> None:
     """End the job if a mesh file changed since the study was read."""
-    if hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest() != source["content"]:
+    if checksum(source["file"]) != source["content"]:
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
 
 
@@ -49,13 +48,9 @@ def write(folder: str | Path, name: str, key: str, made: GroupedMesh | None, kno
         path.unlink(missing_ok=True)
     else:
         write_mesh(path, made.mesh)
-        known |= {"checksum": checksum(path), "unusable": dict(made.unusable)}
-        known["sides"] = {name: edges.tolist() for name, edges in made.sides.items()}
-        known["points"] = {name: [float(x) for x in point] for name, point in made.points.items()}
-        known["parts"] = {
-            name: {str(corners): np.flatnonzero(inside).tolist() for corners, inside in cells.items()}
-            for name, cells in made.parts.items()
-        }
+        known |= {"checksum": checksum(path), "unusable": made.unusable, "sides": made.sides, "points": made.points}
+        parts = made.parts.items()
+        known["parts"] = {name: {count: np.flatnonzero(inside) for count, inside in own.items()} for name, own in parts}
     store.add(notes, {NOTES_KEY: {"key": key, **known}})
 
 

@@ -58,11 +58,9 @@ def _scene_table(data, selection):
     number = int(numbers[0]) if len(numbers) == 1 else None
     swept = [name for name in SWEPT if name in data.status.dims]
     sign = LOADS[selection["load"]].sign if "force" in swept else 1.0
-    columns = (
-        {"mesh_size_mm": ("mesh_size", 1e3)} | _swept_columns(swept) | {"force_N": ("force", sign)} | NETWORK_COLUMNS
-    )
+    columns = {"mesh_size_mm": ("mesh_size", 1e3)} | _swept_columns(swept) | {"force_N": ("force", sign)}
     present = (data.status != 0).transpose("beam", "mesh_size", *swept, "kinematics", "definition")
-    rows = table_rows(data, present, ("beam", "kinematics", "definition"), columns)
+    rows = table_rows(data, present, ("beam", "kinematics", "definition"), columns | NETWORK_COLUMNS)
     words = {-1: "unknown", 0: "no", 1: "yes"}
     for row in rows:
         row |= {"status": STATUS[row["status"]], "reference_applies": words[int(row["reference_applies"])]}

@@ -84,12 +84,11 @@ def plot_engine_errors(data, ax=None, *, scene=None):
             panel.axhline(error, color="0.45", linewidth=0.8, zorder=0, linestyle=(0, (1, 1.5)))
         texts = ", ".join(f"{name} {error:.2g} %" for name, error in known.items())
         said.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
-        panel.set(**style.LOGARITHMIC)
+        style.logarithmic(panel)
         low, high = panel.get_xlim()
         if low < 1e3 * FRAME_SECONDS < high:
             panel.axvline(1e3 * FRAME_SECONDS, color="0.7", linewidth=0.9, zorder=0)
             said.insert(1, "right of the grey line: slower than real time")
-        style.plain(panel, "x", "y")
     style.add_legend(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
     return panel
 
@@ -136,8 +135,7 @@ def plot_engine_curves(data, ax=None, *, scene=None):
             ratio, name = 1 + one.error, cell_text(dict(zip(names, values)), {"dt": "s"})
             panel.plot(one.stiffness_factor, ratio.where(ratio > 0), label=name, **style.line(number))
         panel.plot(1, 1 + case.definition_error.sel(definition=rows.definition.iloc[0]), "k+", markersize=7, zorder=4)
-        panel.set(**style.LOGARITHMIC)
-        style.plain(panel, "x", "y")
+        style.logarithmic(panel)
         panel.axhline(1, color="0.45", linewidth=0.8, zorder=0)
         return [], ""
 

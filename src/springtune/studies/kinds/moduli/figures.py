@@ -3,12 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from springtune.safe_io import no_mathematics
-
 from ...output import style
 from ...output.answers import count_statuses
 from ...output.dataset import at, choose, group, labelled_beam, labels_of, last_swept, sign_of_errors
-from ...output.style import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 
 
 def definitions(tree):
@@ -152,13 +149,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         for values in 100 * cells.deformation_error.transpose(*place).values[::-1]:  # the finest solved mesh stays
             error = np.where(np.isfinite(values), values, error)
         asked = (cells.status != 0).any("mesh_size").transpose(*place[1:]).values
-        texts = np.where(asked, NO_RESULT, NOT_ASKED).astype(object)
-        for row, column in np.argwhere(np.isfinite(error)):
-            texts[row, column] = error_text(error[row, column]) + "*" * bool(doubted[column])
-        heat_map(panel, error, texts)
-        panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
-        panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL_TEXT)
-        panel.set_yticks(range(len(names)), map(no_mathematics, names))
+        style.heat_map(panel, pd.DataFrame(error, names, loads), asked, doubted.values, "+")
         return [], ""
 
     shown = {}
@@ -166,12 +157,11 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         ratio = f"ν = {float(root.material_poisson_ratio.sel(material=material)):g}"
         shown[ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}"] = material
     flags = root.status.sel(material=materials).values
-    said = [sign_of_errors(root), f"{NO_RESULT}: no result" * bool((flags > 1).any())]
-    said += [f"{NOT_ASKED}: not requested" * bool((flags == 0).any())]
-    said += [f"*: {BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
-    title = (
-        f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}: deformation error [%] on the finest mesh solved"
-    )
+    said = [sign_of_errors(root), f"{style.NO_RESULT}: no result" * bool((flags > 1).any())]
+    said += [f"{style.NOT_ASKED}: not requested" * bool((flags == 0).any())]
+    said += [f"*: {style.BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
+    title += ": deformation error [%] on the finest mesh solved"
     said, height = "; ".join(filter(None, said)), 1.2 + 0.165 * len(names)
     return style.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
 

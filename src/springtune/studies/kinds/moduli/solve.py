@@ -22,7 +22,6 @@ def solve(task, moduli):
         return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
     return {
         "status": Status.SOLVED,
-        "message": "",
         "young_modulus_error": found.young_modulus_error,
         "effective_poisson_ratio": found.poisson_ratio,
         "shear_modulus_error": found.shear_modulus_error,

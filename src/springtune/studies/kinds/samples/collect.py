@@ -13,7 +13,7 @@ from springtune.problem.quantities import Status
 from springtune.reference.answers import unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.model import declared_variables
+from ...config.model import declared_dimensions, declared_variables
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
@@ -22,23 +22,15 @@ from .interpolate import problem_key
 from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
-SAMPLES = Group(
-    "/samples",
-    declared_variables(__file__, "/samples"),
-    dimensions={"sample": "row of the design"},
-    further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
-)
+DIMENSIONS, FLAGS = declared_dimensions(__file__), {"reference_applies": ("no", "yes")}
+
+SAMPLES = Group("/samples", declared_variables(__file__, "/samples"), DIMENSIONS, FLAGS)
+SOBOL = Group("/sobol", declared_variables(__file__, "/sobol"), DIMENSIONS)
 
 QUANTITIES = "displacement", "deformation_error", "best_stiffness"  # quantities with Sobol indices
 
 ORDERS, ENDS = ("first", "total"), ("", "_low", "_high")
 """Orders of Sobol indices, and the ends of their bootstrap bands."""
-
-SOBOL = Group(
-    "/sobol",
-    declared_variables(__file__, "/sobol"),
-    dimensions={"quantity": "what is looked at", "parameter": "parameter that varies"},
-)
 
 
 def groups(study, folder):
@@ -130,7 +122,7 @@ def _coordinates(sample, drawn, dimensions):
     if len(parts) > 1:
         variables["role"] = ("sample",), "1", "part of the base sample: A, B, or A with one parameter of B", 0
         places["role"] = np.tile(range(len(parts)), sample.size)
-    return replace(SAMPLES, variables=SAMPLES.variables | variables, flags={"role": tuple(parts)}), places
+    return replace(SAMPLES, variables=SAMPLES.variables | variables, flags=FLAGS | {"role": tuple(parts)}), places
 
 
 def _indices(sample, data):

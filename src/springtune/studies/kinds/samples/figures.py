@@ -72,9 +72,8 @@ def plot_sobol(data, ax=None, *, load=None):
             style.write_reason(panel, "does not vary" if int(indices.base_samples) else none, bare=False)
         return [], ""
 
-    note = "full: first order, pale: total order; lines: bootstrap bands, 95 %" + ", cut off" * bool(
-        bands.min() < low or bands.max() > high
-    )
+    cut_off = ", cut off" * bool(bands.min() < low or bands.max() > high)
+    note = f"full: first order, pale: total order; lines: bootstrap bands, 95 %{cut_off}"
     size, lost = samples.attrs["size"], int(found.base_samples_without.max())
     note += f"; {size} base samples" + f", up to {lost} left out: a scene has no value" * bool(lost)
     columns = max(1, min(4, len(order)))
@@ -98,9 +97,8 @@ def tables(tree):
         return []
     found = tree["sobol"].to_dataset()
     labels = ["quantity", "load", "definition", "parameter"]
-    columns = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
-    columns.append("base_samples")
-    frame = found[columns].to_dataframe(dim_order=labels).reset_index()[[*labels, *columns]]
+    columns = [name for name in found.data_vars if name != "base_samples_without"]
+    frame = found[columns].to_dataframe(dim_order=labels).reset_index()
     frame = frame[frame.base_samples > 0]
     frame["definition"] = frame["definition"].mask(frame["quantity"] == "best_stiffness", "")  # one of all definitions
     rows = frame.drop_duplicates(labels).to_dict("records")

@@ -182,6 +182,11 @@ class SamplesConfig(Section):
         return {name: one for name, one in given.items() if one is not None}
 
     @property
+    def drawing(self) -> dict[str, Any]:
+        """Arguments of `draw` besides the base samples."""
+        return {"design": self.design, "seed": self.seed, "parameters": self.drawn}
+
+    @property
     def varied(self) -> list[str]:
         """Parameters that are not fixed."""
         return varied(self.drawn)
@@ -280,10 +285,8 @@ def result_key(sample, load, definition):
 def _reference_tasks(study):
     """Yield the task of the references of each kind of load."""
     sample = study.parts["samples"]
-    drawn, box = None, reference_box(sample)
-    if sample.rows <= MOST_SOLVED_ROWS:
-        drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.drawn}
-        drawn |= {"first": 0, "last": sample.size}
+    box, few = reference_box(sample), sample.rows <= MOST_SOLVED_ROWS
+    drawn = sample.drawing | {"first": 0, "last": sample.size} if few else None
     for kind in dict.fromkeys(LOADS[name].kind for name in sample.load):
         key, values = reference_key(sample, kind), {"kind": kind.name, "box": box}
         yield Task(values, seconds=1.0, name=kind.name, file=key, key=key, shared={"sample": drawn})
@@ -297,8 +300,7 @@ def _block_tasks(study):
         for load in sample.load
         for definition in sample.solved
     }
-    shared = {name: getattr(sample, name) for name in ("design", "seed", "mesh_type")}
-    shared |= {"parameters": sample.drawn, "results": scenes}
+    shared = sample.drawing | {"mesh_type": sample.mesh_type, "results": scenes}
     shared["meshed"] = hash_of(sample.mesh_type, stage_key(SOLVE), mesh_type_key(sample.mesh_type))
     for first, last in blocks(sample.design, sample.size):
         key, seconds = block_key(sample, first, last), 6e-4 * (last - first) * sample.each * len(scenes)

@@ -73,11 +73,9 @@ def plot_stability_maps(data, ax=None):
         panel.pcolormesh(*places, one.behaviour, cmap=colours, vmin=-0.5, vmax=3.5, shading="nearest")
         for look in ({"color": "black"}, {"color": "white", "linewidth": 0.5}):
             panel.plot(places[0], one.step_ratio_predicted.where(one.step_ratio_predicted < 100), **look)
-        panel.set(
-            **style.LOGARITHMIC, ylim=(steps.min(), steps.max()), xlabel="Damping ratio", ylabel="Step over 2/ωₘₐₓ"
-        )
+        panel.set(ylim=(steps.min(), steps.max()), xlabel="Damping ratio", ylabel="Step over 2/ωₘₐₓ")
         panel.grid(False)
-        style.plain(panel, "x", "y")
+        style.logarithmic(panel)
         return [], "" if np.isfinite(one.behaviour).any() else "nothing was run"
 
     shown = {SCHEMES.get(name, name.replace("-", " ").capitalize().replace("euler", "Euler")): name

@@ -38,11 +38,7 @@ def solve(task):
     """Run an experiment."""
     made = {"beam": Beam(**task["beam"]), "material": material_of(task["material"]).in_plane}
     setup = Setup(**{name: value for name, value in task.items() if name not in ("key", "name")} | made)
-    begin = time.perf_counter()
-    rows = [
-        {name: value.item() if isinstance(value, np.generic) else value for name, value in row.items()}
-        for row in EXPERIMENT_FUNCTIONS[task["name"]](setup)
-    ]
+    begin, rows = time.perf_counter(), EXPERIMENT_FUNCTIONS[task["name"]](setup)
     return {"rows": [*rows, {"experiment_seconds": time.perf_counter() - begin, "experiment_message": ""}]}
 
 
@@ -70,17 +66,13 @@ class Setup:
         """Springs of the definition."""
         return self.cache(mesh).derive(self.definition, self.material)[0]
 
-    def springs_without_load(self, mesh):
-        """Springs without the forces that the definition adds to a load."""
-        return replace(self.springs(mesh), lateral=0.0)
-
     def cache(self, mesh):
         """Cache of a mesh."""
         return _mesh_cache(mesh, self.beam.thickness)
 
     def problem(self, mesh, kind=AXIAL, follower=False):
         """Static problem and its reference stiffness."""
-        springs = self.springs_without_load(mesh)
+        springs = replace(self.springs(mesh), lateral=0.0)  # without the forces that a definition adds to a load
         return self.cache(mesh).problem(kind, springs, follower), springs.reference
 
     def loaded(self, mesh):
@@ -88,12 +80,10 @@ class Setup:
         problem, reference = self.problem(mesh)
         return problem, self.force / reference
 
-    def motion(self, mesh, **options):
+    def motion(self, mesh, linear=True, **load):
         """Undamped motion of the beam under its force."""
-        options = {"linear": True} | options
-        return motion_of(
-            self.cache(mesh), AXIAL, self.springs_without_load(mesh), self.material.density, self.force, **options
-        )
+        springs, density = replace(self.springs(mesh), lateral=0.0), self.material.density
+        return motion_of(self.cache(mesh), AXIAL, springs, density, self.force, linear=linear, **load)
 
 
 @lru_cache(maxsize=1)
@@ -126,14 +116,9 @@ def limits(setup):
         yield {"mesh_size": size, "omega_max": motion.omega_max, "dt_particle_bound": 2 / motion.particle_bound}
         for integrator, damper, ratio in product(EXPLICIT, AXES["damper"], AXES["damping_ratio"]):
             damped = modified(motion, **_damping(motion, damper, ratio))
-            yield {
-                "mesh_size": size,
-                "integrator": integrator,
-                "damper": damper,
-                "damping_ratio": ratio,
-                "dt_limit_predicted": damped.step_limit(integrator),
-                "dt_limit_measured": measured_limit(damped, integrator),
-            }
+            labels = {"mesh_size": size, "integrator": integrator, "damper": damper, "damping_ratio": ratio}
+            predicted, measured = damped.step_limit(integrator), measured_limit(damped, integrator)
+            yield labels | {"dt_limit_predicted": predicted, "dt_limit_measured": measured}
 
 
 def _damping(motion, kind, ratio):
@@ -470,7 +455,5 @@ def _arch(setup):
     yield from (dict(zip(names, values)) for values in zip(AXES["arch_point"], *found))
 
 
-EXPERIMENT_FUNCTIONS = {
-    one.__name__: one
-    for one in (limits, maps, drift, rest, slivers, contrast, poisson, sizes, strains, perturbation, buckling)
-}
+FUNCTIONS = limits, maps, drift, rest, slivers, contrast, poisson, sizes, strains, perturbation, buckling
+EXPERIMENT_FUNCTIONS = {one.__name__: one for one in FUNCTIONS}
