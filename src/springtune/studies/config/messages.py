@@ -49,7 +49,7 @@ class Problems:
     def __init__(self, file: str, lines: Lines | None = None, content: Any = None, folder: Path = Path()) -> None:
         self._file, self._lines, self.content, self.folder = file, lines or {}, content, folder
         self.places: dict[tuple[Key, ...], str] = {}  # of values that come from other files
-        self._found: list[tuple[int, str]] = []
+        self.found: list[tuple[int, str]] = []
 
     def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
         """Add a problem."""
@@ -59,12 +59,7 @@ class Problems:
         line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
         place = self.places.get(path) or (f"{self._file}:{line}" if line else self._file)
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{clipped(key)}" for key in path).removeprefix(".")
-        self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
-
-    @property
-    def nothing(self) -> bool:
-        """Return whether no problem was added."""
-        return not self._found
+        self.found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
 
     def stop_at(self, path: Iterable[Key], message: str, line: int = 0) -> None:
         """Add a problem, and raise."""
@@ -73,7 +68,7 @@ class Problems:
 
     def stop(self) -> None:
         """Raise if a problem was added."""
-        messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
+        messages = list(dict.fromkeys(message for _, message in sorted(self.found, key=lambda found: found[0])))
         more = len(messages) - SHOWN_PROBLEMS
         messages[SHOWN_PROBLEMS:] = [f"... and {more} more"] if more > 0 else []
         if messages:

@@ -298,8 +298,10 @@ PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2
 def origin(study: Study, package: Path = PACKAGE) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    software = {name: version_of(name) for name in (*SOFTWARE, *_plugins(study))}
-    software["python"] = platform.python_version()
+    used = {label for labels in study.axes.values() for label in labels}
+    tables: tuple[ExtensibleMapping[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
+    plugins = {package for table in tables for name, package in table.packages.items() if name in used}
+    software = {name: version_of(name) for name in (*SOFTWARE, *plugins)} | {"python": platform.python_version()}
     found = {
         "title": study.title,
         "Conventions": "CF-1.11",
@@ -319,13 +321,6 @@ def origin(study: Study, package: Path = PACKAGE) -> dict[str, str]:
         found["references"] = f"paper_*: as printed in {PRINTED.get(name, name)}"
     found |= {f"figure_{name}": str(value) for name, value in study.style.items()}
     return found | ({"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {})
-
-
-def _plugins(study: Study) -> set[str]:
-    """Distributions of the definitions, mesh types and loads of other packages that a study uses."""
-    used = {label for labels in study.axes.values() for label in labels}
-    tables: tuple[ExtensibleMapping[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
-    return {package for table in tables for name, package in table.packages.items() if name in used}
 
 
 def inputs(study: Study) -> dict[str, str]:

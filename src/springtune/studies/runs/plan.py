@@ -113,10 +113,8 @@ def stage_jobs(study: Study, folder: Path) -> dict[str, Job]:
                 bundles[stage.name] = {name: [name] for name in named} if stage.alone else share_out(seconds)
     for stage in stages():
         for label, names in bundles.get(stage.like or stage.name, {}).items():
-            own = [task for name in names for task in tasks[stage.name].get(name, ())]
-            if own:
-                job = _job(stage, folder, label, own)
-                jobs[job.name] = job
+            if own := [task for name in names for task in tasks[stage.name].get(name, ())]:
+                jobs[f"{stage.name}_{label}"] = _job(stage, folder, label, own)
     return jobs
 
 

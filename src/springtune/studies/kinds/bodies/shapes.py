@@ -529,9 +529,9 @@ def check(config, problems):
         for file in files_of(shape, problems.folder).values():
             if why := why_unreadable(file):
                 problems.add((*path, "file"), f"'{file}': {why}; {FROM_THE_STUDY}")
-            elif problems.nothing:
+            elif not problems.found:
                 _check_file(name, shape, Path(file), path, problems, extents)
-    for name, grid in (config.shape_grids or {}).items() if problems.nothing else ():
+    for name, grid in (config.shape_grids or {}).items() if not problems.found else ():
         _check_grid(config, grid, ("shape_grids", name), problems)
 
 
@@ -543,7 +543,7 @@ def _check_outline(name, shape, path, problems):
     for part in sorted(set(shape.parts) - parts):
         what = f"{nearest(part, parts)}; or give it to what fills a hole" if parts else "no hole has a 'part'; add it"
         problems.add((*path, "parts", part), f"unknown part '{part}'; {what}")
-    made = _make_shape(name, shape, path, problems) if problems.nothing else None
+    made = _make_shape(name, shape, path, problems) if not problems.found else None
     if made is None:
         return
     known = [*made.groups, *made.points, *made.parts]
@@ -660,7 +660,7 @@ def _check_grid(config, grid, path, problems):
     made = {name: shape for name, shape in shapes.items() if shape.file is None}
     if made and grid.mesh_size is None:
         problems.add((*path, "mesh_size"), "'mesh_size' is missing; give a length such as '5 mm', a list, or a range")
-    for name, shape in made.items() if problems.nothing else ():
+    for name, shape in made.items() if not problems.found else ():
         wide, high = np.ptp(shape_of_config(name, shape, Path()).extent, axis=0)
         if max(grid.mesh_size) > min(wide, high) > 0:
             most = f"{1e3 * min(wide, high):.4g} mm"
