@@ -69,7 +69,7 @@ class TestEquilibrium:
         where = mesh.points + (0 if kinematics == "linear" else result.displacements)
         along = where[mesh.edges[:, 1]] - where[mesh.edges[:, 0]]
         pulls = result.spring_forces[:, None] * along / np.linalg.norm(along, axis=1)[:, None]
-        total = found.force * found.sheet.weights(found.kind)
+        total = found.force * found.sheet.loading(found.kind).pattern
         np.add.at(total, mesh.edges[:, 0], pulls)
         np.subtract.at(total, mesh.edges[:, 1], pulls)
         largest = np.abs(result.spring_forces).max()

@@ -14,7 +14,7 @@ def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, rel
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
     mesh = st.MESH_TYPES[mesh_type](length, height, size)
     sheet = MeshCache(mesh, 1.0)
-    return sheet.problem(kind, st.Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
+    return sheet.problem(kind, st.Springs(1.0, (relative or uniform)(mesh))), sheet.loading(kind).pattern
 
 
 CLAMP = (st.Support("left", x=0, y=0),)

@@ -1,13 +1,13 @@
 """Supports, forces and measured quantities of load cases on a mesh, and their checks; arrays are (n_points, 2)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..mesh.cells import Mesh, no_cells, signed_areas
 from ..mesh.sheets import GroupedMesh, check_held, part_names, parts_of, side_fault
 from ..mesh.sides import in_words
-from .loads import MIDDLE, LoadKind, Side
+from .loads import MIDDLE, LoadKind
 from .shapes import LoadCase, Quantity, check_names
 
 FACE_POSITIONS = np.linspace(0.0, 1.0, 101)  # places of the profile of a pressed face, over its length [1]
@@ -22,39 +22,29 @@ CELL_TOLERANCE = 1e-6
 MOST_NEWTON_STEPS = 50  # Newton steps that look for a point in a quadrilateral
 
 
-def box(mesh: Mesh, sides: Iterable[Side]) -> GroupedMesh:
-    """Groups of the mesh of a box."""
-    return GroupedMesh(mesh, {side.name: side_edges(mesh, side) for side in dict.fromkeys(sides)})
-
-
-def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
-    """Return the edges (n, 2) on a side of a box with its lower left corner at the origin."""
-    return mesh.outline_edges(side.axis, side.place(*mesh.points.max(axis=0)))
+def box(mesh: Mesh, kind: LoadKind) -> GroupedMesh:
+    """Mesh of a box at the origin with the groups of a kind of load: sides, and the middle of a pressed one."""
+    size = mesh.points.max(axis=0)
+    sides = dict.fromkeys([kind.loaded, *(side for side, _ in kind.held)])
+    middle = 0.5 * (mesh.points.min(axis=0) + size)
+    middle[kind.normal] = kind.loaded.place(*size)
+    edges = {side.name: mesh.outline_edges(side.axis, side.place(*size)) for side in sides}
+    return GroupedMesh(mesh, edges, {MIDDLE: middle} if kind.pressed else {})
 
 
 def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return the directions that a kind of load holds, see `springtune.problem.loads`."""
-    return supported(box(mesh, (side for side, _ in kind.held)), kind.case)[0]
+    return supported(box(mesh, kind), kind.case)[0]
 
 
 def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return each particle's weight in an even load over the loaded side: sum 1 along the force, zero across."""
-    return even(box(mesh, [kind.loaded]), kind.loaded.name, kind.axis)
+    return even(box(mesh, kind), kind.loaded.name, kind.axis)
 
 
 def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return the weights of a load's displacement, sum 1: the loaded side's mean, or under pressure its middle."""
-    return displacement_weights(loaded_box(mesh, kind), kind.case.quantities[0])
-
-
-def loaded_box(mesh: Mesh, kind: LoadKind) -> GroupedMesh:
-    """Mesh of a box with the groups that a kind of load measures: its loaded side, or the middle of a pressed one."""
-    if not kind.pressed:
-        return box(mesh, [kind.loaded])
-    middle = np.zeros(2)
-    middle[kind.normal] = kind.loaded.place(*mesh.points.max(axis=0))
-    middle[kind.along] = 0.5 * (mesh.points[:, kind.along].min() + mesh.points[:, kind.along].max())
-    return GroupedMesh(mesh, points={MIDDLE: middle})
+    return displacement_weights(box(mesh, kind), kind.case.quantities[0])
 
 
 def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:

@@ -127,12 +127,10 @@ def assured(errors: np.ndarray) -> np.ndarray:
 
     Arrays are (n_approaches, n_sizes), finest size first. NaN there, and from where a finer one failed.
     """
-    errors = np.abs(errors)
-    found = np.full(errors.shape, np.nan)
-    for i, run_on in enumerate(np.isfinite(errors)):
-        for j in np.flatnonzero(run_on)[1:]:
-            found[i, j] = errors[i, int(np.argmax(run_on)) : j + 1].max()
-    return found
+    run_on = np.isfinite(errors)
+    number = np.cumsum(run_on, axis=1)
+    largest = np.maximum.accumulate(np.where(number > 0, np.abs(errors), 0.0), axis=1)  # NaN from a NaN on
+    return np.where(run_on & (number > 1), largest, np.nan)
 
 
 def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:

@@ -1,11 +1,11 @@
 """Boundary-value problems of scenes: a beam under a force, or a shape under a load case."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -40,6 +40,9 @@ MOST_DISTANCE_FROM_SIDE = 1e-5
 
 LEAST_COVERED = 0.9
 """Least length of a group's edges over the length of its sides: six chords are 5 % shorter than a circle."""
+
+
+Answer = TypeVar("Answer")
 
 
 class BoundaryProblem(ABC):
@@ -214,7 +217,10 @@ class BeamProblem(BoundaryProblem):
     def reference(self, law: str = "") -> "ReferenceSolution | FiniteStrainSolution":
         """Converged finite-element solution, in small strain or of the material's law at finite strain."""
         if law:
-            return _solve_finite(self.beam, self.material, self.force, self.kind, self.follower)
+            from ..reference.finite_strain import solve_finite_strain  # here, since finite elements are slow to import
+
+            problem = self.beam, self.material, self.force, self.kind, "", self.follower
+            return _solve_once(solve_finite_strain, *problem)
         return unit_reference(self.beam, self.material, self.kind, self.force)
 
     def reference_values(self, law: str = "") -> dict[str, float]:
@@ -465,25 +471,15 @@ def _distances(side: OutlineSide, points: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(points - nearest, axis=1))
 
 
-@lru_cache(maxsize=32)
-def _solve_unit(aspect_ratio: float, nu: float, kind: LoadKind) -> "ReferenceSolution":
-    from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
-
-    return solve_unit(aspect_ratio, nu, kind)
-
-
-@lru_cache(maxsize=32)
-def _solve_finite(
-    beam: Beam, material: Material, force: float, kind: LoadKind, follower: bool
-) -> "FiniteStrainSolution":
-    from ..reference.finite_strain import solve_finite_strain  # here: as of `_solve_unit`
-
-    return solve_finite_strain(beam, material, force, kind, follower=follower)
+@lru_cache(maxsize=64)
+def _solve_once(solve: Callable[..., Answer], *problem: Any) -> Answer:
+    return solve(*problem)
 
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
     """Reference under a force [N], solved once for all beams, materials and forces that differ by factors."""
     from ..reference.answers import unit_problem, unit_scales
+    from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
 
     length, displacement = unit_scales(beam, material, kind)
-    return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)
+    return _solve_once(solve_unit, *unit_problem(beam, material, kind)).scaled(force * displacement, length)

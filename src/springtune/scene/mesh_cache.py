@@ -17,7 +17,7 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh.cells import Mesh, share_edges
 from ..mesh.sheets import GroupedMesh
-from ..problem.boundary import held, loaded_box, measured, side_edges, weights
+from ..problem.boundary import box, displacement_weights, even, supported
 from ..problem.loads import LoadKind
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
 from ..problem.quantities import Status, nearest
@@ -94,10 +94,11 @@ class Loading:
     dead: np.ndarray | None = None
 
 
-def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
+def box_loading(grouped: GroupedMesh, kind: LoadKind, follower: bool) -> Loading:
     """Load of 1 N on a box; with `follower` it turns with its side."""
-    turning = FollowerPressure.of_side(mesh, side_edges(mesh, kind.loaded), kind.along) if follower else None
-    return Loading((kind, follower), held(mesh, kind), weights(mesh, kind), follower=turning)
+    side, (held, _) = kind.loaded.name, supported(grouped, kind.case)
+    turning = FollowerPressure.of_side(grouped.mesh, grouped.sides[side], kind.along) if follower else None
+    return Loading((kind, follower), held, even(grouped, side, kind.axis), follower=turning)
 
 
 @dataclass(frozen=True)
@@ -132,8 +133,9 @@ class MeshCache:
         self, mesh: Mesh, thickness: float, networks: int = NETWORKS_KEPT, like: "MeshCache | None" = None
     ) -> None:
         self.mesh, self.thickness, self.networks = mesh, thickness, networks
-        self.weights, self.measured = cache(partial(weights, mesh)), cache(partial(measured, mesh))
-        self.loading, self.loaded = cache(partial(box_loading, mesh)), cache(partial(loaded_box, mesh))
+        self.loaded = box_of = cache(partial(box, mesh))
+        self.loading = cache(lambda kind, follower=False: box_loading(box_of(kind), kind, follower))
+        self.measured = cache(lambda kind: displacement_weights(box_of(kind), kind.case.quantities[0]))
         self.filled: set[Beam] = set()
         self.references: dict[tuple[object, ...], Any] = {}
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None

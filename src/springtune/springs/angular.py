@@ -18,7 +18,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
-from .base import Springs, definition, triangles_only
+from .base import Springs, definition
 from .lattice import half_weight
 
 
@@ -30,7 +30,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     nu = material.poisson_ratio
     reference = material.young_modulus * thickness / (math.sqrt(3) * (1 - nu))
     squares = 4 / math.sqrt(3) * signed_areas(mesh.points, mesh.triangles)

@@ -189,6 +189,8 @@ class Definition(Declaration):
                 f"has a law of sheets whose thickness is free, and {named} is in plane strain; choose 'delingette', or "
                 "plane 'stress'"
             )
+        if 4 not in self.cells:
+            triangles_only(mesh)
         arguments = (given,) if self.needs else ()
         found = self.function(mesh, material.in_plane, thickness, *arguments)
         if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):

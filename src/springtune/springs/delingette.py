@@ -26,7 +26,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, corner_angles, signed_areas
 from ..problem.materials import AnyMaterial, Material
-from .base import Springs, definition, membrane_stiffness, triangles_only
+from .base import Springs, definition, membrane_stiffness
 
 
 @definition("delingette", order=230, cells=(3,), anisotropic=True, st_venant=True)
@@ -50,7 +50,6 @@ def tensile(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
 def _springs(mesh: Mesh, material: AnyMaterial, thickness: float, coupled: bool) -> Springs:
     from ..mechanics.energies import BiquadraticEnergy  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     if isinstance(material, Material):
         stiffness, coupling = _isotropic(mesh, material)
     else:

@@ -31,7 +31,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, corner_angles, signed_areas
 from ..problem.materials import Material
-from .base import NO_STIFFNESS, Springs, definition, triangles_only
+from .base import NO_STIFFNESS, Springs, definition
 
 
 @definition("ielsm", order=224, cells=(3,))
@@ -42,7 +42,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     nu = material.poisson_ratio
     bulk, shear = math.sqrt(3) / 2, math.sqrt(3) / 2 * (1 - nu) / (1 + nu)  # over the stiffness inside a lattice
     reference = material.young_modulus * thickness / (math.sqrt(3) * (1 - nu))

@@ -28,7 +28,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
-from .base import Springs, definition, triangles_only
+from .base import Springs, definition
 from .lattice import COEFFICIENT, half_weight
 
 
@@ -42,7 +42,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     from ..mechanics.energies import BiquadraticEnergy  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     nu = material.poisson_ratio
     spring_modulus = COEFFICIENT * 4 / (3 * (1 + nu))  # over E
     modulus = (3 * nu - 1) / (2 * (1 - nu**2)) / spring_modulus

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, corner_angles
 from ..problem.materials import Material
-from .base import Springs, definition, triangles_only
+from .base import Springs, definition
 
 
 @definition("neo-hooke", order=240, cells=(3,), finite_strain=True)
@@ -30,7 +30,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     from ..mechanics.energies import NeoHookeEnergy, YeohEnergy  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     nu = material.poisson_ratio
     ones = np.ones(len(mesh.triangles))
     shear = 1 / (2 * (1 + nu))  # over E

@@ -30,7 +30,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
-from .base import Springs, definition, triangles_only
+from .base import Springs, definition
 
 
 @definition("normal-shear", order=222, cells=(3,))
@@ -41,7 +41,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     from ..mechanics.energies import BiquadraticEnergy  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     nu = material.poisson_ratio
     reference = material.young_modulus * thickness / (math.sqrt(3) * (1 - nu))  # of an edge inside a lattice
     squares = mesh.edge_lengths[mesh.cell_edges[3]] ** 2

@@ -39,7 +39,7 @@ import numpy as np
 from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import van_gelder
-from .base import Springs, definition, triangles_only
+from .base import Springs, definition
 from .identification import tested_body
 
 NU = 1 / 3  # Poisson's ratio of springs alone [1]
@@ -67,7 +67,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     from ..mechanics.network import Network  # here: see `springtune.springs`
 
-    triangles_only(mesh)
     held = tested_body(mesh)
     start = van_gelder.springs(mesh, material, thickness).relative
     forces, _ = polynomial_tests(mesh)

@@ -23,11 +23,10 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
-from .base import Springs, definition, not_negative, triangles_only
+from .base import Springs, definition, not_negative
 
 
 def _shapes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    triangles_only(mesh)
     areas = signed_areas(mesh.points, mesh.triangles)[:, None]
     return areas, mesh.edge_lengths[mesh.cell_edges[3]] ** 2
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh
 from ..problem.materials import Material, Rubber
-from .base import DefinitionError, Springs, definition, triangles_only
+from .base import DefinitionError, Springs, definition
 
 
 @definition("yeoh", order=245, cells=(3,), finite_strain=True)
@@ -30,7 +30,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
     from .neo_hooke import of_rubber
 
-    triangles_only(mesh)
     if not isinstance(material, Rubber):
         raise DefinitionError(
             f"needs a material that is fitted to a test and {repr(material.name) if material.name else 'this one'} is "

@@ -140,7 +140,7 @@ def solve_beam(beam, sheet, field, task):
 
 def _pressed_face(sheet, kind, displacements):
     """Mean displacement of a pressed face and its profile, along the force [m]."""
-    weights = sheet.weights(kind)
+    weights = sheet.loading(kind).pattern
     face = np.flatnonzero(weights[:, kind.axis] > 0)
     x, moved = sheet.mesh.points[face, kind.along], displacements[face, kind.axis]
     order = np.argsort(x)
