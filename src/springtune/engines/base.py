@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from importlib.util import find_spec
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..handover.simulation import ENERGY_WORDS, VALUES, Net
 from ..linalg.kernels import compiled
 from ..mechanics import PRECISIONS
 from ..mechanics.energies import Energy
-from ..problem.quantities import positive, put
+from ..problem.quantities import positive, put, whole
 from ..registry import Declaration, Registry, how_to_install
 from ..safe_io import number_text
 
@@ -33,15 +33,6 @@ def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
         what = "of zero or more" if least == 0 else "above zero"
         raise ValueError(f"{name}: {value!r} is not a finite number {what}; give one")
     return float(value)
-
-
-def count(value: Any, name: str, most: int = MOST_STEPS) -> int:
-    """Return a whole number above zero, up to the most that is run."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
-        raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
-    if int(value) > most:
-        raise ValueError(f"{name}: {value!r} is more than {most}; give fewer")
-    return int(value)
 
 
 class EngineError(ValueError):
@@ -100,8 +91,8 @@ class Setting:
         if isinstance(dt, str) and "/" in dt and dt.replace("/", "", 1).replace(" ", "").isdigit():
             above, below = map(int, dt.split("/"))
             dt = above / below if below else 0.0
-        substeps, iterations = count(self.substeps, "substeps"), count(self.iterations, "iterations")
-        put(self, dt=positive(dt, "time", "dt"), substeps=substeps, iterations=iterations)
+        counts = {name: whole(getattr(self, name), name, MOST_STEPS) for name in ("substeps", "iterations")}
+        put(self, dt=positive(dt, "time", "dt"), **counts)
         if self.dt > LONGEST_FRAME:
             why = f"{self.dt:g} s is longer than {LONGEST_FRAME:g} s"
             raise ValueError(f"dt: {why}; give the time of a frame such as 1/60")
@@ -214,9 +205,7 @@ class Engine(Declaration):
     def absent(self) -> str:
         """Why it cannot run here, and how to install it; empty where it can."""
         lacking = [need for need in self.needs if not _is_installed(need)]
-        if not lacking:
-            return ""
-        return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}"
+        return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}" if lacking else ""
 
     def check(self, setting: Setting, net: SpringNet | None = None) -> None:
         """Refuse what the engine cannot run.

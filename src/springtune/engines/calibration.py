@@ -208,9 +208,7 @@ class EngineFit(Tabled):
         """
         if self.factor != self.factor:
             raise EngineError(self.message)
-        result, springs = self.result, self.scene.springs
-        springs = replace(springs, reference=self.factor * springs.reference)
-        net = SpringNet.from_scene(self.scene, springs=springs, errors=False)
+        result, net = self.result, net_of(self.scene, self.factor)
         why = f"{NOT_COMPUTED}: the stiffness is that for engine '{result.engine}' at {result.setting}, which has not"
         calibrated = {
             "engine": result.engine,

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..handover.mujoco import elasticity, model
+from ..handover.mujoco import flex, model
 from ..handover.net import SpringNet
-from ..handover.simulation import Simulation, lame
+from ..handover.simulation import Simulation
 from .base import SPRING_STIFFNESS, EngineError, Parameter, Session, Setting, engine, version_numbers
 
 FLEX_SINCE = 4  # version of MuJoCo from which on a flex has the law of plane stress
@@ -29,10 +29,9 @@ TYPED = {
 
 def typed(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each tendon, or the constants of the flex."""
-    if not net.energies:
+    if not (sheet := flex(net)):
         return {"stiffness": net.stiffness}
-    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"))
-    return {"young": young / net.thickness, "poisson": poisson, "thickness": net.thickness}
+    return {"young": sheet["young"] / net.thickness, "poisson": sheet["poisson"], "thickness": net.thickness}
 
 
 @contextmanager

@@ -14,9 +14,10 @@ from ..handover.net import SpringNet
 from ..handover.simulation import EquilibriumWarning, simulate
 from ..problem.boundary import displacement_weights
 from ..problem.compare import error_text
+from ..problem.quantities import whole
 from ..safe_io import Tabled, number_text
 from ..scene.single import Result, Scene
-from .base import ENGINES, Engine, EngineError, Session, Setting, count, number
+from .base import ENGINES, Engine, EngineError, Session, Setting, number
 
 MOST_PERCENTS = 2  # displacement over the reference's from which its error is given in times
 
@@ -133,8 +134,8 @@ class EngineResult(Tabled, Ended):
     @cached_property
     def reference(self) -> float:
         """Displacement of the load by finite elements [m]."""
-        known, quantities = self.scene.reference_values(), self.scene.boundary_problem.case.quantities
-        return next((known[one.name] for one in quantities if one.kind == "displacement"), np.nan)
+        one = self.scene.boundary_problem.watched
+        return self.scene.reference_values()[one.name] if one else np.nan
 
     @property
     def error(self) -> float:
@@ -174,10 +175,8 @@ class EngineResult(Tabled, Ended):
     @property
     def residual(self) -> float:
         """Out-of-balance force of the network at the engine's displacements, over the load, with `factor` in it [1]."""
-        network, reference = self.scene.network, self.factor * self.scene.springs.reference
-        load = network.reduce(self.scene.forces) / reference
-        with np.errstate(over="ignore", invalid="ignore"):
-            return float(np.linalg.norm(load - network.free_forces_over_k(self.displacements)) / np.linalg.norm(load))
+        load = self.scene.forces / (self.factor * self.scene.springs.reference)
+        return self.scene.motion(load=load).residual(self.displacements)
 
     @property
     def drifts(self) -> str:
@@ -281,7 +280,7 @@ def in_engine(
     session = chosen.start(net, setting, damping)
     window = max(1, round(WINDOW_PERIODS * 2 * np.pi / frequency / setting.dt))
     usual = max(MOST_FRAMES, ceil(LEAST_PERIODS / WINDOW_PERIODS) * window)
-    asked = usual if frames is None else count(frames, "frames", MOST_ITERATIONS)
+    asked = usual if frames is None else whole(frames, "frames", MOST_ITERATIONS)
     if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_ITERATIONS:
         why = f"{asked} frames of {setting} are over {MOST_ITERATIONS:.0e} iterations"
         raise EngineError(f"dt: {why}; take a longer dt, or fewer substeps")
@@ -301,14 +300,11 @@ def with_precision(engine: Engine, setting: Setting) -> Setting:
 
 def drift(scene: Scene, displacements: np.ndarray) -> float:
     """Error of what is measured in the other direction, over what finite elements move along [1]; or NaN."""
-    grouped, quantities = scene.boundary_problem.grouped, scene.boundary_problem.case.quantities
-    for one in quantities:
-        if one.kind == "displacement":
-            exact = scene.reference().at(scene.mesh.points)
-            across = displacement_weights(grouped, replace(one, component="y" if one.component == "x" else "x"))
-            along = np.tensordot(exact, displacement_weights(grouped, one), axes=2)
-            return float(np.tensordot(displacements - exact, across, axes=2) / abs(along))
-    return np.nan
+    if not (one := scene.boundary_problem.watched):
+        return np.nan
+    exact, grouped = scene.reference().at(scene.mesh.points), scene.boundary_problem.grouped
+    across = displacement_weights(grouped, replace(one, component="y" if one.component == "x" else "x"))
+    return float(np.tensordot(displacements - exact, across, axes=2) / abs(scene.displacement_of(exact)))
 
 
 def reordered(net: SpringNet, order: int) -> tuple[SpringNet, np.ndarray]:
@@ -338,10 +334,8 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
     if scene.kinematics == "linear":
         raise EngineError("kinematics: 'linear', and engines keep the length law of springs; take 'nonlinear'")
     scene.motion()  # refuses what has no masses, and loads that turn or prescribe displacements
-    net = SpringNet.from_scene(scene, errors=False)
-    grown = [one.values | {name: factor * values for name, values in one.moduli.items()} for one in net.energies]
-    energies = tuple(replace(one, values=values) for one, values in zip(net.energies, grown))
-    return replace(net, stiffness=factor * net.stiffness, energies=energies)
+    springs = replace(scene.springs, reference=factor * scene.springs.reference)
+    return SpringNet.from_scene(scene, springs=springs, errors=False)
 
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:

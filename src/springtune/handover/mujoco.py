@@ -60,7 +60,7 @@ def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
         extent=0.6 * float(np.hypot(*(high - low))),
         size=float(net.rest_lengths.mean()),
         particles=list(zip(range(len(free)), net.points.tolist(), free, masses.tolist(), dampers.tolist())),
-        flex=_flex(net),
+        flex=flex(net),
         springs=list(zip(net.springs.tolist(), net.stiffness.tolist(), net.rest_lengths.tolist())),
         shares=[(joint, share) for joint, share in zip(joints, shares.tolist()) if share],
         of_beam=load and "force" in load,
@@ -87,7 +87,7 @@ def elasticity(first: float, second: float) -> tuple[float, float]:
     return 2 * (1 + poisson) * second, poisson
 
 
-def _flex(net: Net) -> dict[str, Any] | None:
+def flex(net: Net) -> dict[str, Any] | None:
     """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
     if not net.energies:
         return None

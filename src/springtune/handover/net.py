@@ -24,17 +24,7 @@ from ..problem.shapes import Beam
 from ..registry import hook
 from ..safe_io import Tabled
 from ..scene.boundary_problem import BeamProblem, ShapeProblem, check_filled
-from ..scene.mesh_cache import (
-    A_BEAM,
-    A_MATERIAL,
-    A_MESH,
-    AnyDefinition,
-    MeshCache,
-    check_stiffness,
-    definition_of,
-    is_a,
-    naming_errors,
-)
+from ..scene.mesh_cache import AnyDefinition, MeshCache, definition_of, given_stiffness, is_a, naming_errors
 from ..scene.motion import stable_steps
 from ..scene.single import Scene
 from ..springs.base import Definition, DefinitionError, Springs
@@ -218,18 +208,17 @@ class SpringNet(Tabled, Net):
         ValueError
             If the mesh does not fill the beam, or loads are given without a beam.
         """
-        is_a(mesh, Mesh, "mesh", A_MESH)
-        is_a(material, Material, "material", A_MATERIAL)
+        is_a(mesh, Mesh, "mesh")
+        is_a(material, Material, "material")
         if beam is not None:
-            is_a(beam, Beam, "beam", A_BEAM)
+            is_a(beam, Beam, "beam")
             check_filled(mesh, beam)
         elif loads is not None:
             raise ValueError(f"loads: {loads!r} have expected errors on the mesh of a beam alone; give beam, too")
         chosen = definition_of(definition)
         sheet = MeshCache(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
         if springs is None:
-            check_stiffness(chosen, stiffness)
-            given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
+            given = given_stiffness(chosen, stiffness)
             with naming_errors(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
         inertia = None if material.density is None else masses(mesh, material.density, sheet.thickness)

@@ -41,7 +41,7 @@ class Blocks:
 
 def blocks(net: Net) -> list[Blocks]:
     """Constraints of the energies besides springs; ValueError if a spring or an energy has no positive compliance."""
-    _check_positive(net, net.stiffness, "springs have a negative stiffness", len(net.springs))
+    _check_positive(net, net.stiffness, "springs have a negative stiffness")
     return [_blocks(net, terms) for terms in net.energies]
 
 
@@ -52,12 +52,12 @@ def compliances(net: Net) -> dict[str, Any]:
     return found | {f"{one.kind} compliance": one.compliance for one in blocks(net)}
 
 
-def _check_positive(net: Net, values: np.ndarray, which: str, count: int, remedy: str = MESH_REMEDY) -> None:
+def _check_positive(net: Net, values: np.ndarray, which: str, remedy: str = MESH_REMEDY) -> None:
     negative = int((values < 0).sum())
     if negative:
         raise ValueError(
-            f"definition '{net.header['definition']}': {negative} of {count} {which}, and no compliance of XPBD is "
-            f"negative; {remedy}, or 'patch' or 'lattice', whose springs all pull"
+            f"definition '{net.header['definition']}': {negative} of {len(values)} {which}, and no compliance of XPBD "
+            f"is negative; {remedy}, or 'patch' or 'lattice', whose springs all pull"
         )
 
 
@@ -72,12 +72,12 @@ def _blocks(net: Net, terms: Terms) -> Blocks:
             stiffness[:, j, k] = stiffness[:, k, j] = values["coupling"][:, i] / 2
         least, _, most = np.linalg.eigvalsh(stiffness).T
         which = "triangles have squared lengths that are not stable by themselves"
-        _check_positive(net, least - 1e-12 * most, which, len(cells))
+        _check_positive(net, least - 1e-12 * most, which)
         return Blocks(kind, cells, np.linalg.inv(stiffness), {"rest_length": values["rest_length"]})
     areas = values["rest_area"]
     if kind == "area":
         which = "areas have a negative modulus: springs alone have a Poisson's ratio of 1/3, the material a smaller one"
-        _check_positive(net, values["modulus"], which, len(cells), "take 'delingette'")
+        _check_positive(net, values["modulus"], which, "take 'delingette'")
         return Blocks(kind, cells, (areas / values["modulus"])[:, None, None], {"rest_area": areas})
     slopes = area_slopes(net.points[cells].transpose(2, 1, 0)).transpose(2, 1, 0) / areas[:, None, None]
     kept = {"rest_area": areas, "rest_slope": slopes}
@@ -86,12 +86,12 @@ def _blocks(net: Net, terms: Terms) -> Blocks:
     else:
         modulus = 2 * values["c1"]
         kept["stiffening"] = np.column_stack([values["c2"], values["c3"]]) / values["c1"][:, None]
-    _check_positive(net, modulus, "triangles of rubber have a negative modulus", len(cells))
+    _check_positive(net, modulus, "triangles of rubber have a negative modulus")
     if kind == "incompressible":
         second, third = kept["stiffening"].T
         # The least factor on C, over all strains.
         least = np.where(second < 0, 1 - second**2 / (4 * np.maximum(third, 1e-300)), np.minimum(third, 0))
-        _check_positive(net, least, "triangles of rubber soften until they have no energy", len(cells))
+        _check_positive(net, least, "triangles of rubber soften until they have no energy")
     return Blocks(kind, cells, np.eye(3) / (modulus * areas)[:, None, None], kept)
 
 

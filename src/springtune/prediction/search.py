@@ -16,11 +16,11 @@ from ..mesh.free import mesh_shape
 from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import quantity
+from ..problem.quantities import quantity, whole
 from ..problem.shapes import Beam, Shape
 from ..safe_io import Tabled, mesh_size_text, number_of
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
-from ..scene.mesh_cache import A_MATERIAL, is_a
+from ..scene.mesh_cache import is_a
 from . import choices
 from .choices import SEARCHED_PARTICLES, USUAL_LOADS, Choice, References, Trial, as_sure_as, in_order
 
@@ -284,8 +284,7 @@ def find_mesh(
     at worst 1.0 %, steps up to 1515 ns
     """
     wanted = asked_error(error)
-    if not (isinstance(most, int) and most > 0):
-        raise ValueError(f"most: {most!r} is no number of particles; give one such as {SEARCHED_PARTICLES}")
+    whole(most, "most")
     if isinstance(beam, Shape):
         if loads is not USUAL_LOADS or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
@@ -296,7 +295,7 @@ def find_mesh(
     elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     else:
-        is_a(material, Material, "material", A_MATERIAL)
+        is_a(material, Material, "material")
         assert isinstance(material, Material)  # for type checkers
         given = MESH_TYPES if mesh_types is None else mesh_types
         names = choices.check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
@@ -460,11 +459,9 @@ class _Search:
         name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
         tried = Trial(self.family.problems(one.size), self.known, [name])
         choice = replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone)))
-        step, finer = (
-            tried.step_limit(name),
-            (each for each in self.solved if each.cells > cells and name in each.errors),
-        )
-        return MeshChoice(one.mesh_type, one.size, cells, choice, one.particles, one.springs, step, tuple(finer))
+        finer = tuple(each for each in self.solved if each.cells > cells and name in each.errors)
+        about = one.mesh_type, one.size, cells, choice, one.particles, one.springs
+        return MeshChoice(*about, tried.step_limit(name), finer)
 
     def _keeps(self, name: str, mesh: SolvedMesh) -> bool:
         """Whether a definition keeps the error on a mesh; the reference's error estimate is added."""

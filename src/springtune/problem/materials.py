@@ -27,7 +27,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..safe_io import csv_rows, numbers
-from .quantities import PLANES, Number, positive, put, quantity
+from .quantities import PLANES, Number, positive, put, quantity, whole
 
 INCOMPRESSIBLE = (
     "0.5: in plane strain an incompressible material has no finite stiffness; give a ratio below 0.5 such as 0.49, or "
@@ -566,12 +566,11 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
             f"material: one is given, and the body has the parts {names}; name those of others, such as "
             f"{{'': ..., {example!r}: ...}}, as `study.materials_of` does"
         )
-    found = {part: given.get(part, given.get("")) for part in parts}
-    for part, one in found.items():
-        if one is None:
+    for part in parts:
+        if part not in given and "" not in given:
             which = f"part {part!r}" if part else "the main part, ''"
             raise ValueError(f"material: {which} has none; given: {', '.join(map(repr, given)) or 'none'}")
-    return {part: one for part, one in found.items() if one is not None}
+    return {part: given[part if part in given else ""] for part in parts}
 
 
 def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
@@ -699,12 +698,6 @@ def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
     return tuple(float(f"{one:.{FIT_DIGITS}g}") for one in found)
 
 
-def check_terms(terms: object, most: int) -> None:
-    """Refuse a number of terms that is out of range."""
-    if isinstance(terms, bool) or not isinstance(terms, int) or not 1 <= terms <= most:
-        raise ValueError(f"terms: {terms!r} is not a number of terms; give 1 to {most}")
-
-
 def fit_rubber(
     uniaxial: TensileTest | str | Path,
     *,
@@ -760,7 +753,7 @@ def fit_rubber(
     solved: 108 mm
     """
     test = read_test(uniaxial)
-    check_terms(terms, MOST_TERMS)
+    whole(terms, "terms", MOST_TERMS)
     stretch, excess = test.stretch, Rubber.excess("uniaxial", test.stretch)
     slopes = [n * excess ** (n - 1) for n in range(1, terms + 1)]  # of a coefficient of 1 Pa
     found = fit(np.stack([2 * (stretch - stretch**-2) * slope for slope in slopes], axis=1), test)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 from difflib import get_close_matches
 from enum import IntEnum
+from numbers import Integral
 from typing import Any
 
 Number = float | Any  # A number in SI units, for which a text with its unit may be given as well
@@ -35,6 +36,15 @@ def positive(value: float | str, kind: str, name: str) -> float:
     if beyond(number, kind):
         raise ValueError(f"{name}: {value!r} is beyond all measure; {_remedy(kind)}")
     return number
+
+
+def whole(value: Any, name: str, most: float = math.inf) -> int:
+    """Return a whole number above zero, up to the most that is run."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
+        raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
+    if int(value) > most:
+        raise ValueError(f"{name}: {value!r} is more than {most}; give fewer")
+    return int(value)
 
 
 def put(frozen: object, **values: object) -> None:

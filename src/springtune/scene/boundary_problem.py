@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from ..mechanics.continuum import cell_stresses, particle_stresses
 from ..mechanics.network import FollowerPressure, Network
 from ..mesh.cells import Mesh
 from ..mesh.sheets import GroupedMesh, box_fault, part_names, parts_of
@@ -20,7 +21,7 @@ from ..problem.quantities import positive
 from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_body
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
-from .mesh_cache import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, Loading, MeshCache, Solution, choose, is_a, solve_and_judge
+from .mesh_cache import Loading, MeshCache, Solution, choose, is_a, solve_and_judge
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
@@ -28,9 +29,6 @@ if TYPE_CHECKING:
     from ..reference.small_strain import ReferenceSolution
 
     AnyReference = ReferenceSolution | FiniteStrainSolution | ShapeReference
-
-A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"  # call that makes a mesh with groups, for messages
-
 
 MOST_GAP = 1e-6  # largest gap between a mesh and its beam, over the beam's extent
 
@@ -120,12 +118,14 @@ class BoundaryProblem(ABC):
         value = partial(self._value, self.case.quantities[0], springs, problem.network)
         return solve_and_judge(problem, self.force / springs.reference, self.kinematics, value)
 
+    @property
+    def watched(self) -> Quantity | None:
+        """First displacement among the quantities."""
+        return next((one for one in self.case.quantities if one.kind == "displacement"), None)
+
     def displacement(self, displacements: np.ndarray) -> float:
         """First displacement among the quantities [m]; NaN where there is none."""
-        for one in self.case.quantities:
-            if one.kind == "displacement":
-                return self._displacement(one, displacements)
-        return np.nan
+        return self._displacement(self.watched, displacements) if self.watched else np.nan
 
     def _displacement(self, one: Quantity, moved: np.ndarray) -> float:
         """Displacement of interest [m]."""
@@ -158,8 +158,6 @@ class BoundaryProblem(ABC):
         if one.kind == "reaction":
             weights = boundary.reaction_weights(self.grouped, self.case, one)
             return float(np.tensordot(self.reactions(springs, network, moved), weights, axes=2))
-        from ..mechanics.continuum import cell_stresses, particle_stresses  # here: few ask for stress
-
         corners, cell, shares = boundary.cell_at(self.grouped, one.of)
         stresses, names = cell_stresses(network, moved, linear), part_names(self.grouped)
         same = {count: labels == names[corners][cell] for count, labels in names.items()}
@@ -189,21 +187,20 @@ class BeamProblem(BoundaryProblem):
         kinematics: str,
         sheet: MeshCache | None = None,
     ) -> None:
-        is_a(beam, Beam, "beam", A_BEAM)
-        is_a(mesh, Mesh, "mesh", A_MESH)
-        is_a(material, Material, "material", A_MATERIAL)
+        is_a(beam, Beam, "beam")
+        is_a(mesh, Mesh, "mesh")
+        is_a(material, Material, "material")
         assert isinstance(mesh, Mesh) and isinstance(material, Material)  # for type checkers
         self.sheet = sheet_of(mesh, beam.thickness, sheet)
         if beam not in self.sheet.filled:
             check_filled(mesh, beam)
             self.sheet.filled.add(beam)
-        about = load if isinstance(load, Load) else choose(LOADS, load, "load")
+        self.load, about = (load.kind.name, load) if isinstance(load, Load) else (load, choose(LOADS, load, "load"))
         if force is None:
             raise ValueError("force: none; give the size of the force on the beam such as '400 kN'")
         self.size = positive(force, "force", "force")
         self.force = about.sign * self.size
         self.beam, self.material, self.kind, self.case = beam, material, about.kind, about.kind.case
-        self.load = about.kind.name if isinstance(load, Load) else load
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
         self.body, self.label, self.thickness = beam.label, f"{self.load} of {self.size:g} N", beam.thickness
         self.by_part = {"": material}
@@ -251,10 +248,9 @@ class ShapeProblem(BoundaryProblem):
         kinematics: str,
         sheet: MeshCache | None = None,
     ) -> None:
-        is_a(shape, Shape, "shape", A_SHAPE)
-        if isinstance(grouped, Mesh):
-            raise ValueError(f"mesh: is of no groups for supports and loads; give one such as {A_GROUPED_MESH}")
-        is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
+        is_a(shape, Shape, "shape")
+        is_a(grouped, GroupedMesh, "mesh")
+        assert isinstance(grouped, GroupedMesh)  # for type checkers
         self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)
@@ -291,20 +287,15 @@ class ShapeProblem(BoundaryProblem):
         return Loading(key, held, pattern, given if given.any() else None, follower, dead)
 
     def _check(self, one: Quantity) -> None:
-        """Refuse a quantity that cannot be read."""
-        if one.kind == "displacement":
-            boundary.displacement_weights(self.grouped, one)
-        elif one.kind == "reaction":
-            boundary.reaction_weights(self.grouped, self.case, one)
-        elif one.kind == "stress":
-            boundary.cell_at(self.grouped, one.of)
-            particle = self.grouped.particle(one.of)
-            found = set()
-            for count, labels in part_names(self.grouped).items():
-                found |= {self.by_part[name] for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]}
-            if particle is not None and len(found) > 1:
-                why = f"{one.of!r} is where different materials meet; ask for the stress on one side"
-                raise ValueError(f"load {self.load!r}, quantity {one.name!r}: {why}")
+        """Refuse a stress where different materials meet; `boundary.check_case` refuses what else cannot be read."""
+        if one.kind != "stress" or (particle := self.grouped.particle(one.of)) is None:
+            return
+        found = set()
+        for count, labels in part_names(self.grouped).items():
+            found |= {self.by_part[name] for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]}
+        if len(found) > 1:
+            why = f"{one.of!r} is where different materials meet; ask for the stress on one side"
+            raise ValueError(f"load {self.load!r}, quantity {one.name!r}: {why}")
 
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is for beams alone."""
@@ -348,10 +339,10 @@ class ShapeProblem(BoundaryProblem):
 
 def sheet_of(mesh: Mesh, thickness: float, sheet: MeshCache | None) -> MeshCache:
     """Return the sheet of another scene, if it is of this mesh and thickness, or a new one."""
-    sheet = MeshCache(mesh, thickness) if sheet is None else sheet
-    is_a(sheet, MeshCache, "sheet", "that of another scene")
-    if sheet.mesh is not mesh or sheet.thickness != thickness:
-        raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
+    if sheet is None:
+        return MeshCache(mesh, thickness)
+    if not isinstance(sheet, MeshCache) or sheet.mesh is not mesh or sheet.thickness != thickness:
+        raise ValueError(f"sheet: {sheet!r} is not of this mesh and thickness; give that of a scene like this, or none")
     return sheet
 
 
@@ -378,9 +369,7 @@ def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: Group
     parts = parts_of(grouped)
     given = dict(material) if isinstance(material, Mapping) else {"": material}
     for name, one in given.items():
-        if not isinstance(one, AnyMaterial):
-            of = f" of part {name!r}" if name else ""
-            raise ValueError(f"material{of}: {one!r} is not a Material; give one such as {A_MATERIAL}")
+        is_a(one, AnyMaterial, f"material of part {name!r}" if name else "material")
         if name and name not in parts:
             known = f"is no part of the mesh; known: {', '.join(map(repr, parts))}"
             raise ValueError(f"material: {name!r} {grouped.unusable.get(name, known)}")

@@ -26,30 +26,31 @@ USUAL_RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 """Stiffnesses of a curve over E t [1], where none are given."""
 
 
+CurvePath = LinearPath | StablePath  # equilibrium path over force over stiffness
+
 LEAST_RATIO = 1e-9  # least ratio of a stiffness; the largest is one over it [1]
 
 
-def follow(sheet: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
+def follow(sheet: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray) -> CurvePath:
     """Equilibrium path of springs of one stiffness, as far as `loads` need it: force over stiffness [m], one sign."""
     problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
     return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
 
 
-def meeting(path: LinearPath | StablePath, force: float, stiffness: np.ndarray, displacement: np.ndarray,
-            stable: np.ndarray, reference: float, objection: str) -> Best:  # fmt: skip
-    """Stiffness at which a curve of displacements [m] over stiffnesses [N/m] meets its reference [m]; force in N."""
+def meeting(path: CurvePath, force: float, stiffness: np.ndarray, reference: float, objection: str) -> Best:
+    """Stiffness at which a path, asked at stiffnesses [N/m], meets its reference [m]; force in N."""
     if objection:
         return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")
-    best = best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
+    best = best_stiffness(stiffness, path.values, path.stable, reference, lambda one: path.value(force / one))
     if isinstance(path, LinearPath) and best.status is Status.SOLVED:
         # In proportion: to the last digit the same from all points of a curve.
         return replace(best, stiffness=path.value(force) / reference)
     return best
 
 
-def ending(path: LinearPath | StablePath, force: float, stable: np.ndarray) -> str:
+def ending(path: CurvePath, force: float) -> str:
     """Why a curve is not solved throughout; empty where it is."""
-    if stable.all():
+    if path.stable.all():
         return ""
     reason = path.end or "not followed through its turn"
     return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
@@ -155,10 +156,8 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     >>> print(f"{curve.best_stiffness:.3g} N/m, closed form {curve.predicted_stiffness:.3g} N/m")
     1.6e+08 N/m, closed form 1.59e+08 N/m
     """
-    if hasattr(scene, "shape"):
-        raise ValueError(f"scene: {scene!r} is of a shape, and a curve is of a beam under a load of one size; give one")
     if not hasattr(scene, "follower"):
-        raise ValueError(f"scene: {scene!r} is not a Scene; give one such as springtune.Scene(beam, mesh, ...)")
+        raise ValueError(f"scene: {scene!r} is not of a beam; give one such as springtune.Scene(beam, mesh, ...)")
     if scene.follower:
         raise ValueError(f"load: {scene.load!r} turns with its side, and has no curve; take linear kinematics")
     try:
@@ -177,8 +176,8 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         reference, objection = np.nan, f"no reference: {error}"
     faces = np.concatenate([scene.mesh.outline_edges(1, value) for value in (0.0, scene.mesh.points[:, 1].max())])
     edge = float(np.median(np.abs(np.diff(scene.mesh.points[faces, 0]))))
-    best = meeting(path, force, stiffness, path.values, path.stable, reference, objection)
+    best = meeting(path, force, stiffness, reference, objection)
     predicted = predicted_stiffness(scene.material, beam, edge, scene.load)
-    off, why = deformation_error(path.values, reference), ending(path, force, path.stable)
+    off, why = deformation_error(path.values, reference), ending(path, force)
     title, found = f"{beam.label}, {scene.load} of {abs(force):g} N", (best.stiffness, best.status, best.message)
     return Curve(stiffness, path.values, off, path.stable, why, *found, predicted, title)

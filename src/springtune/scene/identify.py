@@ -65,13 +65,11 @@ CORRELATION_DEVIATIONS = 2.75  # deviations of the correlation of neighbours fro
 
 
 def vary(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:
-    """Change constants by steps: ratios by addition, moduli by factors exp(step), others relatively."""
-    changed = dict(constants)
-    for name, step in zip(names, steps):
-        value = constants[name]
-        added = step if name in USUAL_POISSON_RATIOS else step * abs(value)
-        changed[name] = value * np.exp(step) if name[0] in "EG" else value + added
-    return changed
+    """Change constants by steps: ratios by addition, moduli by factors exp(step)."""
+    return constants | {
+        name: constants[name] + step if name in USUAL_POISSON_RATIOS else constants[name] * np.exp(step)
+        for name, step in zip(names, steps)
+    }
 
 
 def assume_usual(constants: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
@@ -317,7 +315,7 @@ def identify(
     constants_of_law = choose(SHEET_LAWS, law, "law")
     tests = list(tests) if isinstance(tests, Sequence) else [tests]
     for test in tests:
-        is_a(test, MeasuredTest, "tests", "springtune.MeasuredTest(beam, 'traction', 'pull.csv')")
+        is_a(test, MeasuredTest, "tests")
     bodies = [*map(body_of_test, tests)]
     parts = sorted({part for shape, _, mesh in bodies for part in (parts_of(mesh) if mesh else ("", *shape.parts))})
     regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []

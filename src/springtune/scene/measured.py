@@ -16,7 +16,7 @@ from ..problem.quantities import Number, nearest, positive, put, quantity
 from ..problem.shapes import Beam, LoadCase, Segment, Shape
 from ..reference.by_constants import Family
 from ..safe_io import csv_rows, number_of, numbers
-from .mesh_cache import A_BEAM, choose, is_a
+from .mesh_cache import choose, is_a
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")
 """Columns of a field, and those that a curve has at least."""
@@ -109,7 +109,7 @@ class MeasuredTest:
     _missing: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        is_a(self.body, Beam | Shape, "body", A_BEAM)
+        is_a(self.body, Beam | Shape, "body")
         choose(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         columns, lines, missing = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)

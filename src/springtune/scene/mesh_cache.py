@@ -20,16 +20,22 @@ from ..mesh.sheets import GroupedMesh
 from ..problem.boundary import box, displacement_weights, even, supported
 from ..problem.loads import LoadKind
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
-from ..problem.quantities import Status, nearest
-from ..problem.shapes import Beam
+from ..problem.quantities import Status, nearest, positive
+from ..problem.shapes import Beam, Shape
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
+from ..springs.parts import derive_by_parts
 
 NETWORKS_KEPT = 6  # factorized networks of a mesh that are kept; few are enough for scenes in order
 
 
-A_BEAM, A_SHAPE = "springtune.Beam('200 mm', '40 mm')", "springtune.Shape.rectangle('200 mm', '40 mm')"
-A_MESH, A_MATERIAL = "springtune.make_mesh(beam, 'structured', '5 mm')", "springtune.Material('210 GPa', 0.3)"
+EXAMPLES: dict[type, str] = {
+    Beam: "springtune.Beam('200 mm', '40 mm')",
+    Shape: "springtune.Shape.rectangle('200 mm', '40 mm')",
+    Mesh: "springtune.make_mesh(beam, 'structured', '5 mm')",
+    GroupedMesh: "springtune.mesh_shape(shape, '5 mm')",
+    Material: "springtune.Material('210 GPa', 0.3)",
+}
 """Calls that make arguments, for messages."""
 
 AnyDefinition = str | Definition | Callable[..., Springs]
@@ -55,22 +61,24 @@ def choose(known: Mapping[str, Entry], name: object, what: str) -> Entry:
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
-def is_a(value: object, wanted: Any, name: str, example: str) -> None:
+def is_a(value: object, wanted: Any, name: str) -> None:
     """Refuse an argument of another type."""
     if wanted is Material and isinstance(value, AnisotropicMaterial):
         only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
         first, *_ = get_args(wanted) or [wanted]
+        example = EXAMPLES.get(first, f"springtune.{first.__name__}(...)")
         raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
 
 
-def check_stiffness(definition: Definition, stiffness: object) -> None:
-    """Refuse a definition without the uniform stiffness that it needs, or with one that it does not use."""
+def given_stiffness(definition: Definition, stiffness: float | str | None) -> float | None:
+    """Uniform stiffness [N/m] that a definition needs; refuse one that it does not use, and none where it needs one."""
     name, needed = definition.name, definition.needs == "stiffness"
     if needed and stiffness is None:
         raise ValueError(f"stiffness: definition {name!r} needs a uniform one; give a stiffness such as '170e6 N/m'")
     if stiffness is not None and not needed:
         raise ValueError(f"stiffness: {stiffness!r} is not used, definition {name!r} derives its own; leave it out")
+    return None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
 
 
 @contextmanager
@@ -168,13 +176,9 @@ class MeshCache:
                 raise DefinitionError("needs the reference's displacements, and there are none")
             given = [Case(loading.held, factor * loading.pattern, factor * field)]
             key += loading.key, factor
-        elif definition.needs == "stiffness" and stiffness is None:
-            raise DefinitionError("needs a uniform stiffness, and there is none; give one in N/m")
         if self._derived is None or self._derived[0] != key:
             begin = time.perf_counter()
             if others and grouped is not None:
-                from ..springs.parts import derive_by_parts  # here: most bodies are of one material
-
                 springs = derive_by_parts(definition, grouped, by_part, self.thickness, given)
             else:
                 springs = definition.springs(self.mesh, first, self.thickness, given)

@@ -11,11 +11,11 @@ from ..mechanics.continuum import PatchTest
 from ..mesh.cells import Mesh
 from ..mesh.sheets import bonded
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import positive
+from ..problem.quantities import positive, whole
 from ..safe_io import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
-from .mesh_cache import A_MATERIAL, A_MESH, AnyDefinition, MeshCache, choose, definition_of, is_a, naming_errors
+from .mesh_cache import AnyDefinition, MeshCache, choose, definition_of, is_a, naming_errors
 
 START_DEFINITIONS = ("van-gelder", "lattice", "energy-fit")  # definitions from whose springs searches start
 
@@ -137,8 +137,8 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     >>> f"{abs(found.young_modulus_error):.6f} {found.poisson_ratio:.4f} {abs(found.shear_modulus_error):.6f}"
     '0.000000 0.3333 0.000000'
     """
-    is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, AnyMaterial, "material", A_MATERIAL)
+    is_a(mesh, Mesh, "mesh")
+    is_a(material, AnyMaterial, "material")
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(f"definition {definition.name!r} is told its stiffness; choose one such as 'uniform'")
@@ -265,13 +265,12 @@ def best_springs(
     >>> sorted(found.objectives), bool(found.springs.relative.min() > 0)
     (['energy-fit', 'lattice', 'van-gelder'], True)
     """
-    is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, AnyMaterial, "material", A_MATERIAL)
+    is_a(mesh, Mesh, "mesh")
+    is_a(material, AnyMaterial, "material")
     if not isinstance(material, Material):
         raise DefinitionError("material: best springs are of isotropic ones; take definition 'energy-fit' for others")
     thickness = positive(thickness, "length", "thickness")
-    if isinstance(evaluations, bool) or not (isinstance(evaluations, int) and evaluations > 0):
-        raise ValueError(f"evaluations: {evaluations!r} is not a whole number above zero")
+    whole(evaluations, "evaluations")
     if isinstance(starts, str) or not starts:
         raise ValueError(f"starts: {starts!r} is no list of definitions; give some such as {list(START_DEFINITIONS)}")
     begin, sought = time.perf_counter(), material.in_plane

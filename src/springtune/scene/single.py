@@ -3,7 +3,7 @@
 import time
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,17 +27,7 @@ from ..registry import hook
 from ..safe_io import Tabled, number_text
 from ..springs.base import Springs
 from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
-from .mesh_cache import (
-    A_BEAM,
-    A_SHAPE,
-    AnyDefinition,
-    MeshCache,
-    check_stiffness,
-    choose,
-    definition_of,
-    is_a,
-    naming_errors,
-)
+from .mesh_cache import AnyDefinition, MeshCache, choose, definition_of, given_stiffness, is_a, naming_errors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,10 +63,9 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
     >>> len(mesh.points), len(mesh.edges)
     (415, 1143)
     """
-    is_a(beam, Beam, "beam", A_BEAM)
+    is_a(beam, Beam, "beam")
     make, edge = choose(MESH_TYPES, mesh_type, "mesh type"), positive(size, "length", "mesh size")
-    refusal = make.refusal(beam.length, beam.height, edge, f"beam {beam.name!r}")
-    if refusal:
+    if refusal := make.refusal(beam.length, beam.height, edge, f"beam {beam.name!r}"):
         raise ValueError(f"mesh size: {size!r} {refusal}")
     return make(beam.length, beam.height, edge)
 
@@ -105,7 +94,7 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     >>> print(f"{1e6 * st.read_mesh('own.vtu', beam).area:.0f} mm2")
     2000 mm2
     """
-    is_a(beam, Beam, "beam", A_BEAM)
+    is_a(beam, Beam, "beam")
     return read_beam_mesh(path, beam.length, beam.height, positive(unit, "length", "unit"))
 
 
@@ -134,7 +123,7 @@ def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | st
     >>> len(grouped.sides["hole"]), len(grouped.sides["right"])
     (52, 10)
     """
-    is_a(shape, Shape, "shape", A_SHAPE)
+    is_a(shape, Shape, "shape")
     sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
     return mesh_outlined(shape, positive(size, "length", "mesh size"), sizes)
 
@@ -271,8 +260,7 @@ class Scene(Tabled):
         scale: float = 1.0,
         sheet: MeshCache | None = None,
     ) -> None:
-        if kinematics not in KINEMATICS:
-            raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
+        choose(dict.fromkeys(KINEMATICS), kinematics, "kinematics")
         self.kinematics = kinematics
         self.boundary_problem: BoundaryProblem
         if isinstance(beam, Shape):
@@ -290,8 +278,7 @@ class Scene(Tabled):
         self.mesh, self.sheet, self.load = self.boundary_problem.mesh, self.boundary_problem.sheet, load
         self.definition = definition_of(definition)
         self.boundary_problem.check(self.definition)
-        self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
-        check_stiffness(self.definition, stiffness)
+        self.uniform_stiffness = given_stiffness(self.definition, stiffness)
 
     def __repr__(self) -> str:
         about = self.boundary_problem
@@ -315,8 +302,7 @@ class Scene(Tabled):
     @cached_property
     def springs(self) -> "SceneSprings":
         """Springs of the definition: stiffnesses over a reference stiffness, and energies besides them."""
-        springs = self._derived[0]
-        return SceneSprings(**{part.name: getattr(springs, part.name) for part in fields(Springs)}, scene=self)
+        return SceneSprings(**vars(self._derived[0]) | {"scene": self})
 
     @property
     def title(self) -> str:
@@ -739,10 +725,9 @@ class Result(Tabled):
     def _title(self) -> str:
         """Scene and definition; below them the displacement, its reference and error."""
         lines, known = [f"{self.scene.title}, {self.scene.definition.name}"], dict(self._table())
-        named = (one.name for one in self.scene.boundary_problem.case.quantities if one.kind == "displacement")
-        if name := next(named, ""):
-            lines.append(known[name])
-        if error := known.get(f"error of {name}"):
-            reference = number_text(self.scene.reference_values().get(name, np.nan), "m")
-            lines[-1] += f", by finite elements {reference}: {error}"
+        if one := self.scene.boundary_problem.watched:
+            lines.append(known[one.name])
+            if error := known.get(f"error of {one.name}"):
+                reference = number_text(self.scene.reference_values().get(one.name, np.nan), "m")
+                lines[-1] += f", by finite elements {reference}: {error}"
         return "\n".join(lines)

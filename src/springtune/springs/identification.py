@@ -143,9 +143,7 @@ class Misfit:
                 adjoint = factor.solve(miss * weights)
                 normals = network.rest_vectors / network.rest_lengths[:, None]
                 for number in range(len(cases)):
-                    stretches = [
-                        np.einsum("ij,ij->i", normals, network.end_differences(network.expand(field[:, number])))
-                        for field in (found, adjoint)
-                    ]
-                    slope -= relative * stretches[0] * stretches[1]
+                    apart = (network.end_differences(network.expand(one[:, number])) for one in (found, adjoint))
+                    stretches, forces = (np.einsum("ij,ij->i", normals, one) for one in apart)
+                    slope -= relative * stretches * forces
         return total, slope

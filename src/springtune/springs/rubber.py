@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..problem.materials import CHECKED_STRETCHES, TensileTest, TestDataError, check_terms, fit, read_test
+from ..problem.materials import CHECKED_STRETCHES, TensileTest, TestDataError, fit, read_test
+from ..problem.quantities import whole
 
 LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""
@@ -34,7 +35,7 @@ class SpringLaw:
     def fitted(cls, test: TensileTest | str | Path, terms: int = 3) -> "SpringLaw":
         """Law fitted to a uniaxial test along a row, as far as the lattice does not lie flat."""
         test = read_test(test)
-        check_terms(terms, len(LAW_POWERS))
+        whole(terms, "terms", len(LAW_POWERS))
         below = test.stretch < FLAT
         if below.sum() <= terms:
             raise TestDataError(

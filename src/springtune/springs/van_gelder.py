@@ -19,16 +19,9 @@ Public code that cites the article has the form for nu = 0; the general one is d
 triangles.
 """
 
-import numpy as np
-
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
 from .base import Springs, definition, not_negative
-
-
-def _shapes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    areas = signed_areas(mesh.points, mesh.triangles)[:, None]
-    return areas, mesh.edge_lengths[mesh.cell_edges[3]] ** 2
 
 
 @definition("van-gelder", order=80, cells=(3,))
@@ -39,7 +32,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Source: Van Gelder, J. Graphics Tools 3(2), 1998, its abstract and public code that cites it (read).
     """
-    areas, squares = _shapes(mesh)
+    areas = signed_areas(mesh.points, mesh.triangles)[:, None]
+    squares = mesh.edge_lengths[mesh.cell_edges[3]] ** 2
     return Springs(material.young_modulus * thickness, mesh.sum_to_edges({3: areas / squares}))
 
 
@@ -51,7 +45,8 @@ def general(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Source: Van Gelder, J. Graphics Tools 3(2), 1998 (abstract, derived).
     """
-    areas, squares = _shapes(mesh)
+    areas = signed_areas(mesh.points, mesh.triangles)[:, None]
+    squares = mesh.edge_lengths[mesh.cell_edges[3]] ** 2
     nu = material.poisson_ratio
     half_cotangents = (squares.sum(axis=1, keepdims=True) - 2 * squares) / (8 * areas)
     parts = areas / squares / (1 + nu) + nu / (1 - nu**2) * half_cotangents

@@ -45,11 +45,11 @@ def solve(curve, shared):
     path = follow(sheet, LOAD_KINDS[curve["kind"]], curve["kinematics"], force / stiffness)
     reference = any_reference.read(folder, curve["reference"])
     why, wanted = objection(reference, force, curve["kinematics"]), force * reference.get("displacement", np.nan)
-    best = meeting(path, force, stiffness, path.values, path.stable, wanted, why)
+    best = meeting(path, force, stiffness, wanted, why)
     return {
         "displacement": path.values,
         "stable": path.stable,
-        "message": ending(path, force, path.stable),
+        "message": ending(path, force),
         "best_stiffness": best.stiffness,
         "best_status": best.status,
         "best_message": best.message,
