@@ -280,11 +280,9 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= MOST_SPREAD:
             return (low, high), ""
         said = f"is {_between((low, high), runs[0].reference)} in" if low == low else "diverges in some of"
-        return (low, high), (
-            f"the error at {setting} {said} {TRIED_ORDERS} orders of the same particles, with {factor:.4g} times the "
-            "numbers of the definition: the solver has not converged, so no factor holds in other scripts; take more "
-            "substeps or iterations"
-        )
+        tried = f"{TRIED_ORDERS} orders of the same particles, with {factor:.4g} times the numbers of the definition"
+        why = "the solver has not converged, so no factor holds in other scripts; take more substeps or iterations"
+        return (low, high), f"the error at {setting} {said} {tried}: {why}"
 
     def ratio(self, factor: float, setting: Setting) -> float:
         """Displacement over the reference's; NaN where it diverged."""

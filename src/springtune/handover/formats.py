@@ -60,12 +60,10 @@ def write(path: str | Path, net: Net) -> list[Path]:
         return NET_FORMATS[ending](path, net)
     program, text = SIMULATORS[ending]
     calibrated = net.header.get("calibrated")
-    if calibrated and ending != SETTING_ENDINGS.get(calibrated["engine"]):
-        kept = " or ".join(filter(None, [SETTING_ENDINGS.get(calibrated["engine"]), ".csv, .json or .vtu"]))
-        raise ValueError(
-            f"{path}: runs {program} at a step of its own, and the stiffness is for {calibrated['engine']} at "
-            f"{calibrated['setting']}; give a name ending in {kept}"
-        )
+    if calibrated and ending != (own := SETTING_ENDINGS.get(calibrated["engine"])):
+        kept = " or ".join(filter(None, [own, ".csv, .json or .vtu"]))
+        made_for = f"the stiffness is for {calibrated['engine']} at {calibrated['setting']}"
+        raise ValueError(f"{path}: runs {program} at a step of its own, and {made_for}; give a name ending in {kept}")
     write_text(path, text(net))
     return [path]
 

@@ -35,9 +35,8 @@ def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
     moving = ~net.held.all(axis=1)
     least = float(simulation.masses[moving].min())
     if least < LEAST_MASS:
-        raise ValueError(
-            f"masses: the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more; take larger cells"
-        )
+        why = f"the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more"
+        raise ValueError(f"masses: {why}; take larger cells")
     moved = 0.0 if simulation.displacements is None else simulation.displacements
     seen = np.concatenate([net.points, net.points + moved])
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -79,10 +78,8 @@ def elasticity(first: float, second: float) -> tuple[float, float]:
     """Young [N/m] and poisson [1] of a flex of thickness 1 that has two Lame constants, times the thickness [N/m]."""
     ratio = first / second
     if ratio > 2 * (1 + 1e-9):
-        raise ValueError(
-            f"sheet: has a ratio of {ratio / (2 + ratio):.3g} in its plane, and a flex of MuJoCo takes less than 0.5; "
-            "take springs alone, such as 'patch'"
-        )
+        why = f"has a ratio of {ratio / (2 + ratio):.3g} in its plane, and a flex of MuJoCo takes less than 0.5"
+        raise ValueError(f"sheet: {why}; take springs alone, such as 'patch'")
     poisson = min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))  # MuJoCo refuses a half
     return 2 * (1 + poisson) * second, poisson
 

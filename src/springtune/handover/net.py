@@ -254,9 +254,8 @@ class SpringNet(Tabled, Net):
         """
         load = self.header.get("load")
         if load and load.get("prescribed"):
-            raise ValueError(
-                f"load {load['name']!r}: prescribes displacements, which no file of springs has; take a load of forces"
-            )
+            why = "prescribes displacements, which no file of springs has"
+            raise ValueError(f"load {load['name']!r}: {why}; take a load of forces")
         written: list[Path] = hook("files").write(path, self)
         return written
 

@@ -133,9 +133,8 @@ def terms_of(energy: Energy, mesh: Mesh, reference: float) -> Terms:
     """Energy of a network as plain arrays, for all cells with as many corners; moduli are over `reference` [N/m]."""
     kind = next((kind for kind, made in ENERGY_CLASSES.items() if isinstance(energy, made)), "")
     if not kind:
-        raise DefinitionError(
-            f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
-        )
+        own = "use those of springtune.mechanics.energies"
+        raise DefinitionError(f"energy {type(energy).__name__} cannot be written out; {own}")
     given = energy.moduli
     if isinstance(energy, AngleEnergy) and energy.modulus.ndim > 1:
         kind, given = "corner", {"rotational": energy.modulus}
@@ -228,10 +227,8 @@ def simulate(
     if force:
         try:
             if network.rest_factor.negative_pivots:
-                raise ValueError(
-                    f"definition '{net.header['definition']}': is unstable at rest, and flies apart in {program}; "
-                    "take another definition or mesh"
-                )
+                why = f"is unstable at rest, and flies apart in {program}; take another definition or mesh"
+                raise ValueError(f"definition '{net.header['definition']}': {why}")
             lowest, loaded = _lowest_frequency(motion), motion.loaded_frequency
             problem = StaticProblem(network, net.forces / force)
             found = problem.nonlinear(force / reference)
@@ -294,21 +291,18 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
     name = net.header["definition"]
     lacking = next((ENERGY_WORDS[terms.kind] for terms in net.energies if terms.kind not in laws), "")
     if lacking:
-        raise ValueError(
-            f"definition '{name}': has energies of {lacking}, and {program} has no such law; take one such as 'patch'"
-        )
+        why = f"has energies of {lacking}, and {program} has no such law"
+        raise ValueError(f"definition '{name}': {why}; take one such as 'patch'")
     if net.masses is None:
         materials = (net.header["material"], *net.header.get("other_materials", {}).values())
         light = next(one["name"] for one in materials if one.get("density") is None)
-        raise ValueError(
-            f"density: material '{light}' has none, and {program} moves masses; give a density such as '7850 kg/m^3'"
-        )
+        why = f"material '{light}' has none, and {program} moves masses"
+        raise ValueError(f"density: {why}; give a density such as '7850 kg/m^3'")
     load = net.header.get("load")
     if load and load["follower"]:
         instead = "take 'pressure'" if net.header.get("beam") else "give its pressures 'follower: false'"
-        raise ValueError(
-            f"load '{load['name']}': turns with the side that it acts on, and forces in a file do not; {instead}"
-        )
+        why = "turns with the side that it acts on, and forces in a file do not"
+        raise ValueError(f"load '{load['name']}': {why}; {instead}")
     if load and load["kinematics"] == "linear":
         raise ValueError(f"kinematics: 'linear', and springs of {program} keep their length law; take 'nonlinear'")
 
@@ -335,14 +329,12 @@ def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
     away = np.abs(factors * total + signs * twice - given).max() / np.abs(given).max()
     lawful, below = away <= 1e-9 and twice > 0, first <= -1e-9 * twice
     if lawful and below and net.header["definition"] == "delingette":
-        raise ValueError(
-            f"material: has a Poisson's ratio below 0, and {program} takes none; take springs alone, such as 'patch'"
-        )
+        why = f"has a Poisson's ratio below 0, and {program} takes none"
+        raise ValueError(f"material: {why}; take springs alone, such as 'patch'")
     if not lawful or below:
-        raise ValueError(
-            f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
-            f"{program} has the law of a material alone; take 'delingette', or springs alone such as 'patch'"
-        )
+        why = f"its springs of squared lengths are those of no material, and {program} has the law of a material alone"
+        remedy = "take 'delingette', or springs alone such as 'patch'"
+        raise ValueError(f"definition '{net.header['definition']}': {why}; {remedy}")
     return max(first, 0.0), float(twice) / 2
 
 
@@ -355,12 +347,10 @@ def comment_lines(net: Net, simulation: Simulation, integrator: str) -> list[str
         constants = f"Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio {material['poisson_ratio']:g}, "
         constants += "plane strain, " if material.get("plane") == "strain" else ""
     if simulation.frequency:
-        share = simulation.mass_damping / (2 * simulation.frequency)
-        damping = (
-            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, {share:.3g} of the critical one of the lowest "
-            f"frequency; the one that the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} "
-            "times as high."
-        )
+        lowest = simulation.frequency
+        critical = f"{simulation.mass_damping / (2 * lowest):.3g} of the critical one of the lowest frequency"
+        loaded = f"the one that the load excites is {simulation.loaded_frequency / lowest:.3g} times as high"
+        damping = f"Damping over mass is {simulation.mass_damping:.4g} 1/s, {critical}; {loaded}."
     left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
     errors = header["expected_error"].items() if isinstance(header.get("expected_error"), dict) else ()
     expected = ", ".join(f"{name} {100 * error:+.2g} %" for name, error in errors if isinstance(error, float))

@@ -55,10 +55,9 @@ def compliances(net: Net) -> dict[str, Any]:
 def _check_positive(net: Net, values: np.ndarray, which: str, remedy: str = MESH_REMEDY) -> None:
     negative = int((values < 0).sum())
     if negative:
-        raise ValueError(
-            f"definition '{net.header['definition']}': {negative} of {len(values)} {which}, and no compliance of XPBD "
-            f"is negative; {remedy}, or 'patch' or 'lattice', whose springs all pull"
-        )
+        why = f"{negative} of {len(values)} {which}, and no compliance of XPBD is negative"
+        remedy += ", or 'patch' or 'lattice', whose springs all pull"
+        raise ValueError(f"definition '{net.header['definition']}': {why}; {remedy}")
 
 
 def _blocks(net: Net, terms: Terms) -> Blocks:

@@ -562,10 +562,8 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     names = ", ".join(map(repr, parts))
     if len(parts) > 1 and not any(given):
         example = next(filter(None, parts))
-        raise ValueError(
-            f"material: one is given, and the body has the parts {names}; name those of others, such as "
-            f"{{'': ..., {example!r}: ...}}, as `study.materials_of` does"
-        )
+        remedy = f"name those of others, such as {{'': ..., {example!r}: ...}}, as `study.materials_of` does"
+        raise ValueError(f"material: one is given, and the body has the parts {names}; {remedy}")
     for part in parts:
         if part not in given and "" not in given:
             which = f"part {part!r}" if part else "the main part, ''"

@@ -41,10 +41,8 @@ def warn_of_body(sides: Sequence[float], thickness: float, what: str) -> None:
         message = f"{what}: its longer side is {longer:.6g} m, {usual}; {remedy}"
         warnings.warn(message, AssumptionWarning, stacklevel=4)
     if thickness > smaller:
-        message = (
-            f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
-            "stress is an assumption about thin sheets; give a smaller thickness, or a material in plane strain"
-        )
+        why = f"{1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm; plane stress is of thin sheets"
+        message = f"{what}, thickness: {why}; give a smaller thickness, or a material in plane strain"
         warnings.warn(message, AssumptionWarning, stacklevel=4)
 
 

@@ -61,10 +61,8 @@ def _rows(mesh: Mesh, nu: float) -> np.ndarray:
     far = own[np.argmax(np.abs(own - nu))]
     if abs(far - nu) > SHAPE_TOLERANCE:
         base = 2 * x[slanted][0]
-        raise DefinitionError(
-            f"the rows of this mesh have nu = {far:.3g} and the material {nu:.3g}; use rows of height "
-            f"{1e3 * row_height(base, nu):.4g} mm for bases of {1e3 * base:.4g} mm"
-        )
+        remedy = f"use rows of height {1e3 * row_height(base, nu):.4g} mm for bases of {1e3 * base:.4g} mm"
+        raise DefinitionError(f"the rows of this mesh have nu = {far:.3g} and the material {nu:.3g}; {remedy}")
     parts = np.zeros(x.shape)
     # Half triangles at the ends have an edge across; it and the cut row carry what a strip of their area does.
     areas = np.broadcast_to(signed_areas(mesh.points, mesh.triangles)[:, None], x.shape)

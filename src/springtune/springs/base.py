@@ -172,11 +172,8 @@ class Definition(Declaration):
         if not (material.isotropic or self.anisotropic):
             able = [name for name, one in DEFINITIONS.items() if one.anisotropic and not one.needs]
             fitting = [name for name in able if set(mesh.cells) <= set(DEFINITIONS[name].cells)]
-            raise DefinitionError(
-                f"needs an isotropic material and {repr(material.name) if material.name else 'this one'} is "
-                "anisotropic; choose one of "
-                f"{', '.join(map(repr, fitting or able))}"
-            )
+            remedy = f"choose one of {', '.join(map(repr, fitting or able))}"
+            raise DefinitionError(f"needs an isotropic material and {material.name!r} is anisotropic; {remedy}")
         told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
         for name, value in told:
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or beyond(value, name):
@@ -184,11 +181,8 @@ class Definition(Declaration):
         if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
             raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
         if self.finite_strain and isinstance(material, Material) and material.plane == "strain":
-            named = repr(material.name) if material.name else "this one"
-            raise DefinitionError(
-                f"has a law of sheets whose thickness is free, and {named} is in plane strain; choose 'delingette', or "
-                "plane 'stress'"
-            )
+            why = f"has a law of sheets whose thickness is free, and {material.name!r} is in plane strain"
+            raise DefinitionError(f"{why}; choose 'delingette', or plane 'stress'")
         if 4 not in self.cells:
             triangles_only(mesh)
         arguments = (given,) if self.needs else ()
@@ -307,10 +301,9 @@ def _held_together(mesh: Mesh, stiffness: np.ndarray) -> None:
     none = np.abs(stiffness) <= 1e3 * NO_STIFFNESS * np.abs(stiffness).max()
     free = 2 * len(mesh.points) - 3 - int((~none).sum())
     if none.any() and free > 0:
-        raise DefinitionError(
-            f"gives {none.sum()} of {len(stiffness)} springs no stiffness, and without them {free} or more motions of "
-            "the mesh meet no resistance; use a mesh without right angles, such as mesh type 'structured' or 'free'"
-        )
+        why = f"gives {none.sum()} of {len(stiffness)} springs no stiffness, and without them {free} or more motions"
+        remedy = "use a mesh without right angles, such as mesh type 'structured' or 'free'"
+        raise DefinitionError(f"{why} of the mesh meet no resistance; {remedy}")
 
 
 def not_negative(stiffness: np.ndarray) -> np.ndarray:
@@ -318,8 +311,6 @@ def not_negative(stiffness: np.ndarray) -> np.ndarray:
     stiffness = np.where(np.abs(stiffness) <= NO_STIFFNESS, 0.0, stiffness)
     bad = int((stiffness < 0).sum())
     if bad:
-        raise DefinitionError(
-            f"gives {bad} of {len(stiffness)} springs a negative stiffness; use a mesh with less slender or obtuse "
-            "cells"
-        )
+        why = f"gives {bad} of {len(stiffness)} springs a negative stiffness"
+        raise DefinitionError(f"{why}; use a mesh with less slender or obtuse cells")
     return stiffness

@@ -32,9 +32,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         return lattice.springs(mesh, material, thickness)
     along, across = rectangles_only(mesh)
     if (np.abs(along / across - 1) > 0.02).any():
-        raise DefinitionError(
-            f"needs squares and the mesh has rectangles of {1e3 * along[0]:.4g} x {1e3 * across[0]:.4g} mm; "
-            "choose a mesh size that divides both sides of the beam"
-        )
+        found = f"needs squares and the mesh has rectangles of {1e3 * along[0]:.4g} x {1e3 * across[0]:.4g} mm"
+        raise DefinitionError(f"{found}; choose a mesh size that divides both sides of the beam")
     side, diagonal = np.full(len(along), SIDE), np.full(len(along), DIAGONAL)
     return Springs(material.young_modulus * thickness, from_rectangles(mesh, side, side, diagonal))

@@ -53,11 +53,9 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
         here = groups == group
         constants = rotated(material.plane_stress, -float(angles[here].mean())) / reference
         if np.abs(constants[2, :2]).max() > COUPLING:
-            raise DefinitionError(
-                f"needs the axes of the material along the sides of the rectangles, and {material.name!r} has C16 = "
-                f"{reference * constants[0, 2]:.4g} Pa, C26 = {reference * constants[1, 2]:.4g} Pa there; turn mesh or "
-                "material, or choose 'delingette' on triangles"
-            )
+            why = f"needs the axes of the material along the sides of the rectangles, and {material.name!r} has C16 = "
+            why += f"{reference * constants[0, 2]:.4g} Pa, C26 = {reference * constants[1, 2]:.4g} Pa there"
+            raise DefinitionError(f"{why}; turn mesh or material, or choose 'delingette' on triangles")
         (c11, c12, _), (_, c22, _), (_, _, c66) = constants.tolist()
         ratio = (along[here] / across[here]) ** 2
         modulus = c12 - c66

@@ -35,11 +35,10 @@ def derive_by_parts(
     if len(groups) == 1:
         return definition.springs(mesh, next(iter(groups)), thickness, given)
     if definition.needs or definition.uniaxial:
-        why = f"is told {definition.needs}" if definition.needs == "stiffness" else "is told what the whole body does"
-        raise DefinitionError(
-            f"{'is for sheets of one stress' if definition.uniaxial else why} and the body has {len(groups)} "
-            "materials; choose one that derives each part's springs, such as 'van-gelder', 'area' or 'delingette'"
-        )
+        why = "is told stiffness" if definition.needs == "stiffness" else "is told what the whole body does"
+        why = "is for sheets of one stress" if definition.uniaxial else why
+        remedy = "choose one that derives each part's springs, such as 'van-gelder', 'area' or 'delingette'"
+        raise DefinitionError(f"{why} and the body has {len(groups)} materials; {remedy}")
     found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray]]] = []
     for material, names in groups.items():
         cells = {count: np.isin(labels[count], names) for count in mesh.cells}

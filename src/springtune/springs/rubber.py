@@ -38,10 +38,8 @@ class SpringLaw:
         whole(terms, "terms", len(LAW_POWERS))
         below = test.stretch < FLAT
         if below.sum() <= terms:
-            raise TestDataError(
-                f"{test.name}: {terms} terms need more than {below.sum()} points below a stretch of {FLAT:g}, where "
-                "the lattice lies flat; give fewer terms"
-            )
+            why = f"{terms} terms need more than {below.sum()} points below a stretch of {FLAT:g}"
+            raise TestDataError(f"{test.name}: {why}, where the lattice lies flat; give fewer terms")
         test = TensileTest(test.stretch[below], test.stress[below], test.name)
         q = test.stretch
         columns = np.stack([q - q**-power for power in LAW_POWERS[:terms]], axis=1)

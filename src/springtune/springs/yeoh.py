@@ -31,11 +31,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     from .neo_hooke import of_rubber
 
     if not isinstance(material, Rubber):
-        raise DefinitionError(
-            f"needs a material that is fitted to a test and {repr(material.name) if material.name else 'this one'} is "
-            "none; give springtune.fit_rubber('uniaxial.csv'), in a study {uniaxial_test: uniaxial.csv}, or take "
-            "'neo-hooke'"
-        )
+        remedy = "give springtune.fit_rubber('uniaxial.csv'), in a study {uniaxial_test: uniaxial.csv}, or 'neo-hooke'"
+        raise DefinitionError(f"needs a material that is fitted to a test and {material.name!r} is none; {remedy}")
     over = np.array(material.coefficients) / material.young_modulus
     energy = YeohEnergy(mesh.points, mesh.triangles, np.tile(over, (len(mesh.triangles), 1)), material.largest)
     return of_rubber(mesh, material, thickness, energy, 2 * over[0])
