@@ -612,8 +612,7 @@ class Shape:
         put(self, unit=positive(self.unit, "length", f"{what}, unit"))
         put(self, outline=_tuple_of(self.outline, Segment, f"{what}, outline"))
         put(self, holes=_tuple_of(self.holes, Hole, f"{what}, holes"))
-        points = {name: _place(point, f"{what}, point {name!r}") for name, point in dict(self.points).items()}
-        put(self, points=points)
+        put(self, points={name: _place(at, f"{what}, point {name!r}") for name, at in dict(self.points).items()})
         for name, load in dict(self.loads).items():
             _tuple_of([load], LoadCase, f"{what}, loads")
             if name != load.name:
@@ -628,7 +627,7 @@ class Shape:
             return
         try:
             self._check_rounds()
-            put(self, points={name: self._place_point(name, point) for name, point in points.items()})
+            put(self, points={name: self._place_point(name, point) for name, point in self.points.items()})
             for load in self.loads.values():
                 check_names(load, self.groups, self.points)
         except ValueError as error:
@@ -782,6 +781,5 @@ class Shape:
         x, y = positive(length, "length", "length"), positive(height, "length", "height")
         corners = {"lower": (0.0, 0.0), "right": (x, 0.0), "upper": (x, y), "left": (0.0, y)}
         outline = tuple(Segment(corner, group=group) for group, corner in corners.items())
-        return cls(
-            name or f"{1e3 * x:g}x{1e3 * y:g}", thickness, outline, tuple(holes), dict(points or {}), dict(loads or {})
-        )
+        name = name or f"{1e3 * x:g}x{1e3 * y:g}"
+        return cls(name, thickness, outline, tuple(holes), dict(points or {}), dict(loads or {}))
