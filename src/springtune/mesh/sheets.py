@@ -21,10 +21,8 @@ def sheet_fault(mesh: Mesh) -> str:
 
     Rounds of the outline must not touch themselves or each other: no slits, or cells that meet only in a point.
     """
-    if fault := convexity_fault(mesh):
-        return fault
     outline, fault = outline_of(mesh)
-    if fault:
+    if fault := convexity_fault(mesh) or fault:
         return fault
     points = mesh.points
     ways = np.diff(points[outline], axis=1)[:, 0]
@@ -213,8 +211,7 @@ def free_motion(points: np.ndarray, held: np.ndarray) -> str:
     if abs(turn) > 1e-6:
         size = np.ptp(points, axis=0).max()
         about = middle + np.array([-v, u]) / turn * size
-        x0, y0 = 1e3 * np.where(np.abs(about) > 1e-9 * size, about, 0.0)
-        return f"turn about ({x0:.6g}, {y0:.6g}) mm"
+        return f"turn about {in_words(np.where(np.abs(about) > 1e-9 * size, about, 0.0))}"
     return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")
 
 

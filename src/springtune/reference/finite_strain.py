@@ -343,23 +343,20 @@ def _element_ends(length: float, count: int, kind: LoadKind) -> tuple[np.ndarray
     """Ends of the elements along x and along y: of half of a symmetric beam, see `LoadKind.cut`, else of the whole."""
     near = np.linspace(0, 1, count + 1) ** GRADING_POWER
     both = np.concatenate([near, 2 - near[-2::-1]])
+    half = _graded_coordinates(near, length / 2, count)
+    ends = np.concatenate([half, length - half[-2::-1]])
     if kind.along == 0:
-        half = _graded_coordinates(near, length / 2, count)
-        return half if kind.symmetric else np.concatenate([half, length - half[-2::-1]]), both
-    if any(side != LEFT for side, _ in kind.held):  # corners at the loaded end, too
-        half = _graded_coordinates(near, length / 2, count)
-        ends = np.concatenate([half, length - half[-2::-1]])
-    else:
-        ends = _graded_coordinates(near, length, count, None if kind.symmetric else MOST_ELEMENT_RATIO)
+        return half if kind.symmetric else ends, both
+    if all(side == LEFT for side, _ in kind.held):  # no corners at the loaded end
+        ends = _graded_coordinates(near, length, count, np.inf if kind.symmetric else MOST_ELEMENT_RATIO)
     return ends, 1 - near[::-1] if kind.symmetric else both
 
 
-def _graded_coordinates(near: np.ndarray, length: float, count: int, most: int | None = None) -> np.ndarray:
+def _graded_coordinates(near: np.ndarray, length: float, count: int, most: float = np.inf) -> np.ndarray:
     """Coordinates from 0 to length, graded within 1 of 0 and even beyond, there of so many elements at most."""
     if length <= 1:
         return near * length
-    columns = max(1, round(count * (length - 1) / 2))
-    columns = columns if most is None else min(columns, most * count)
+    columns = int(min(max(1, round(count * (length - 1) / 2)), most * count))
     return np.concatenate([near, np.linspace(1, length, 1 + columns)[1:]])
 
 

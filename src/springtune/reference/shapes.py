@@ -86,7 +86,7 @@ class ShapeReference:
 
         No error estimate covers them: in published benchmarks they are off by up to 4e-4 at the tolerance 1e-4.
         """
-        return self._factor * self._level.displacements(points)
+        return self._factor * self._level.at(points, self._level._displacements)
 
     def stress_at(self, points: np.ndarray) -> np.ndarray:
         """Return stresses xx, yy and xy [Pa], shape (n, 3), at points of the body, see `at`."""
@@ -532,7 +532,7 @@ class Level:
         return {quantity.name: self._value(quantity) for quantity in self.problem.load.quantities} | {"": self.energy}
 
     def _value(self, quantity: Quantity) -> float:
-        problem, space = self.problem, self.space
+        space = self.space
         if quantity.kind == "energy":
             return self.energy
         if quantity.kind == "area":
@@ -547,8 +547,6 @@ class Level:
             return self._reaction(quantity.of, axis)
         if quantity.of in space.mesh.named:
             return float(self.field[space.mesh.named[quantity.of], axis])
-        if quantity.of in problem.points:
-            return float(self.displacements(problem.points[quantity.of][None])[0, axis])
         return float(self._shares(quantity.of) @ self.field[:, axis])
 
     def _reaction(self, group: str, axis: int) -> float:
@@ -639,10 +637,6 @@ class Level:
             local[curved] -= step
             curved = curved[np.flatnonzero(np.abs(step).max(axis=1) > 1e-13)]
         return found, local
-
-    def displacements(self, points: np.ndarray) -> np.ndarray:
-        """Displacements at points [m], shape (n, 2)."""
-        return self.at(points, self._displacements)
 
     def at(self, points: np.ndarray, value: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
         """Values at points, some thousand at a time to save memory."""

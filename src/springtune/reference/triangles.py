@@ -100,9 +100,11 @@ class CoarseMesh:
         self.sides[ends[1], new] = replace(side, span=(side.span[1], middle))
         return where
 
-    def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]], parts: list[int]) -> None:
+    def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]]) -> None:
+        """Put triangles in the place of those of some rows, as many for each."""
+        parts = np.repeat(self.parts[rows], len(triangles) // len(rows))
         self.triangles = np.concatenate([np.delete(self.triangles, rows, axis=0), np.array(triangles)])
-        self.parts = np.concatenate([np.delete(self.parts, rows), np.array(parts)])
+        self.parts = np.concatenate([np.delete(self.parts, rows), parts])
 
     def bisect(self, first: int, second: int) -> None:
         """Split a side, and the triangles at it, in the middle."""
@@ -110,14 +112,13 @@ class CoarseMesh:
         where = self._cut_side(first, second, 0.5, new)
         self.points = np.concatenate([self.points, where[None]])
         rows = np.flatnonzero((self.triangles == first).any(axis=1) & (self.triangles == second).any(axis=1))
-        triangles, parts = [], []
+        triangles = []
         for row in rows:
             a, b, c = (int(corner) for corner in self.triangles[row])
             while {a, b} != {first, second}:
                 a, b, c = b, c, a
             triangles += [(a, new, c), (new, b, c)]
-            parts += [int(self.parts[row])] * 2
-        self._replace(rows, triangles, parts)
+        self._replace(rows, triangles)
 
     def insert(self, name: str, where: np.ndarray) -> None:
         """Make a point inside, shape (2,) [m], a named corner of triangles."""
@@ -138,7 +139,7 @@ class CoarseMesh:
         a, b, c = (int(corner) for corner in self.triangles[row])
         new = len(self.points)
         self.points, self.named = np.concatenate([self.points, where[None]]), self.named | {name: new}
-        self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)], [int(self.parts[row])] * 3)
+        self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)])
 
     def part_sides(self) -> dict[_Ends, list[tuple[int, bool]]]:
         """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
@@ -170,7 +171,7 @@ class CoarseMesh:
             rows = np.flatnonzero((self.triangles == corner).any(axis=1))
             cuts: dict[int, int] = {}
             wheres: list[np.ndarray] = []
-            triangles, parts = [], []
+            triangles = []
             for row in rows:
                 v, a, b = (int(point) for point in self.triangles[row])
                 while v != corner:
@@ -186,9 +187,8 @@ class CoarseMesh:
                     triangles += [(near, a, b), (near, b, far)]
                 else:
                     triangles += [(near, a, far), (a, b, far)]
-                parts += [int(self.parts[row])] * 3
             self.points = np.concatenate([self.points, np.array(wheres)])
-            self._replace(rows, triangles, parts)
+            self._replace(rows, triangles)
 
 
 def _are_well_shaped(points: np.ndarray, triangles: np.ndarray) -> bool:
@@ -364,9 +364,6 @@ def corners_of(
     for ends in at_sides:
         for end in ends:
             at_corner.setdefault(end, []).append(ends)
-    inside: dict[int, set[int]] = {}
-    for row, i in zip(*np.nonzero(np.isin(mesh.triangles, list(at_corner)))):
-        inside.setdefault(int(mesh.triangles[row, i]), set()).add(int(mesh.parts[row]))
 
     def leaving(corner: int, ends: _Ends) -> np.ndarray:
         """Direction of a side at a corner."""
@@ -383,7 +380,7 @@ def corners_of(
     for corner, around in at_corner.items():
         outer = [ends for ends in around if len(at_sides[ends]) == 1]
         between = [ends for ends in around if len(at_sides[ends]) > 1]
-        if len(inside[corner]) > 1:
+        if np.ptp(mesh.parts[(mesh.triangles == corner).any(axis=1)]):
             if outer:
                 found[corner] = Corner("parts of different materials meet on the outline")
             elif len(between) != 2:
