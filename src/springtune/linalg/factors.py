@@ -269,9 +269,8 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
         low[left] = True
         lengths = pointers[right + 1] - pointers[right]
         # All neighbours of all particles of the right part, one after the other.
-        starts = np.cumsum(lengths) - lengths
-        places = np.repeat(pointers[right] - starts, lengths) + np.arange(lengths.sum())
-        touches = np.logical_or.reduceat(low[neighbours[places]], starts)
+        places = np.repeat(pointers[right] - np.r_[0, np.cumsum(lengths)[:-1]], lengths) + np.arange(lengths.sum())
+        touches = np.logical_or.reduceat(low[neighbours[places]], np.r_[0, np.cumsum(lengths)[:-1]])
         low[left] = False
         separator, right = right[touches], right[~touches]
         separator = separator[np.argsort(across[~below][touches], kind="stable")]

@@ -337,8 +337,7 @@ class Contact:
         near = False
         for body in self.bodies:
             if body.prescribed is not None:
-                held = body.network.held
-                body.displacements = np.where(held, share * body.prescribed, body.displacements)
+                body.displacements = np.where(body.network.held, share * body.prescribed, body.displacements)
         for count in range(1, MAX_CONTACT_STEPS + 1):
             self.iterations += 1
             longest = self._step(share, near)

@@ -285,10 +285,8 @@ class Motion(Moving):
             pivots = (network.rest_factor if self.linear else network.factorize_tangent(displacements)).negative_pivots
         except SingularError as error:
             return "unstable", f"at rest on a limit point, where the tangent is singular ({error}); use another load"
-        if not pivots and self.linear:
-            return "rest", ""
         if not pivots:
-            why = StaticProblem(network, self.load).departure(1.0, displacements)
+            why = "" if self.linear else StaticProblem(network, self.load).departure(1.0, displacements)
             return "rest", f"at rest where a load that grows slowly does not lead: {why}" if why else ""
         why = f"{pivots} negative pivot{'s' * (pivots > 1)}: the least push would end it"
         remedy = "push the body sideways, by a force of a thousandth of the load, say, and run again"

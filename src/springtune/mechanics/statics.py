@@ -389,10 +389,8 @@ class StaticProblem(LoadedNetwork):
                 if end is not None and np.isnan(lost):
                     guess = self.network.expand(end.u)
                     near = self.newton(there, guess)
-                    far = not near.converged or (
-                        self.network.largest_change(near.displacements - guess) > SURPRISING_CHANGE
-                    )
-                    if not far and not self._is_unstable(there, near):
+                    close = self.network.largest_change(near.displacements - guess) <= SURPRISING_CHANGE
+                    if near.converged and close and not self._is_unstable(there, near):
                         found, failed, missed = near, False, False
             if not failed and (step <= SHORTEST_STEP or not missed):
                 if leaves or missed and np.isnan(unstable):

@@ -30,9 +30,9 @@ def triangulate(
     points: np.ndarray,
     lines: Sequence[tuple[int, int, int, int]],
     what: str,
-    remedy: str,
     sizes: Sequence[float] | None = None,
     region_sizes: Mapping[int, float] | None = None,
+    remedy: str = "give another size",
     **options: float,
 ) -> Triangulation:
     """Triangulate inside lines, by netgen's advancing front.
@@ -72,7 +72,7 @@ def free(length: float, height: float, size: float) -> Mesh:
     box = np.array([length, height]) / size
     corners = box * [(0, 0), (1, 0), (1, 1), (0, 1)]
     lines, what = [(i, (i + 1) % 4, 1, 0) for i in range(4)], f"{length:g} x {height:g} m at {size:g} m"
-    made = triangulate(corners, lines, what, "give another size", maxh=EDGE_FACTOR)
+    made = triangulate(corners, lines, what, maxh=EDGE_FACTOR)
     points = made.points
     for axis in range(2):
         points[np.abs(points[:, axis]) < 1e-9, axis] = 0.0
@@ -106,10 +106,8 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
         made, chains, divided = _netgen(shape, stretches, lines, fine, sizes)
         if not any(stretches[number].side.arc for number in divided):
             return _group_mesh(shape, made, chains, stretches)
-        again: list[Stretch] = []
-        for number, one in enumerate(stretches):
-            again += one.cut([one.low, *(divided.get(number, ()) if one.side.arc else ()), one.high])
-        stretches = again
+        inner = [divided.get(number, ()) if one.side.arc else () for number, one in enumerate(stretches)]
+        stretches = [piece for one, cuts in zip(stretches, inner) for piece in one.cut([one.low, *cuts, one.high])]
     raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
 
 
@@ -234,7 +232,6 @@ def _netgen(
         given,
         [(*ends, *sides) for ends, sides in zip(joined, domains)],
         what,
-        "give another size",
         sizes=[fine.get(point, unit) / unit for point in numbers],
         region_sizes={number: sizes[part] / unit for number, part in parts if part and part in sizes},
         maxh=EDGE_FACTOR,

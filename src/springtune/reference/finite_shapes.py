@@ -97,18 +97,12 @@ class _FiniteLevel(Level, Body):
             self.note = f"triangles at corners keep degree {levels.kept}, {why}"
         super().__init__(problem, degree)
 
-    def _matrices(self) -> np.ndarray:
-        """Return no matrices: tangents take their place."""
-        return np.empty(0)
-
-    def _solve(
-        self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, float]:
+    def _solve(self, forces: np.ndarray, held: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Return coefficients and residual forces, shape (n_functions, 2), and the strain energy."""
         problem, space = self.problem, self.space
         weights, _, gradients = tabulated(space.degree, 2 * space.degree + (4 if space.curved.any() else 0))
         jacobian, determinant = space.jacobians(gradients)
-        self.law = law = self._laws(space.mesh.parts)
+        self.law = law = _PartLaws(np.array(space.mesh.names)[space.mesh.parts], self.levels.laws)
         self.nodes_of = space.numbers
         self.gradients = np.einsum("qiu,equa->eqai", gradients, inverse_of(jacobian, determinant), optimize=True)
         self.weights = weights * np.abs(determinant) * (problem.shape.thickness * law.scales)[:, None]
@@ -117,7 +111,7 @@ class _FiniteLevel(Level, Body):
             at_corners = np.isin(space.corners, sorted(problem.rough)).any(axis=1)
             kept[space.numbers[at_corners]] = True
             kept[space.numbers[:, local_functions(self.kept_degree, space.degree)]] = False
-        self.held, self.given, self.turning = held | kept[:, None], prescribed, self._turning()
+        self.held, self.given, self.turning = held | kept[:, None], given, self._turning()
         self.load, self.extent = forces, float(np.ptp(space.mesh.points, axis=0).max())
         moved = self._continued()
         if moved is None:
@@ -145,9 +139,6 @@ class _FiniteLevel(Level, Body):
         why = "the law gives way there as triangles get finer, and the answer need not have a limit"
         return f" {degrees}, {pressed}: {why}. Round that corner, hold it less or load it less"
 
-    def _laws(self, parts: np.ndarray) -> _PartLaws:
-        return _PartLaws(np.array(self.space.mesh.names)[parts], self.levels.laws)
-
     def _continued(self) -> np.ndarray | None:
         """Equilibrium that Newton's method finds from that of the last level, if it is stable."""
         space, last = self.space, self.levels.last
@@ -161,7 +152,7 @@ class _FiniteLevel(Level, Body):
     @cached_property
     def _slope(self) -> np.ndarray:
         """Linear solution under the whole load."""
-        return Level._solve(self, Level._matrices(self), self.load, self.held, self.given)[0]
+        return Level._solve(self, self.load, self.held, self.given)[0]
 
     def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
         """Relative size of the last step."""
@@ -191,7 +182,7 @@ class _FiniteLevel(Level, Body):
     def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Forces over lengths as they are now and the thickness at rest [Pa], shape (n, 3)."""
         slopes = self.slopes(found, local)
-        law = self._laws(self.space.mesh.parts[found])
+        law = _PartLaws(np.array(self.space.mesh.names)[self.space.mesh.parts[found]], self.levels.laws)
         total = law.scales[:, None] * law.response(strain_of(slopes)).stress
         deformation = slopes + np.eye(2)
         cauchy = deformation @ matrix_of(total) @ np.swapaxes(deformation, 1, 2)

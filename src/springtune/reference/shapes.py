@@ -242,9 +242,8 @@ class Problem:
         if missing := [name for name in present if name not in materials]:
             lacking, given = (", ".join(map(repr, names)) for names in (missing, materials))
             raise ValueError(f"parts without a material: {lacking}; there are materials of {given}")
-        absent = np.zeros((3, 3))
-        planes = {name: one.in_plane.plane_stress for name, one in materials.items()}
-        self.stiffness = np.array([planes[n] if n in present else absent for n in self.mesh.names])
+        planes = {name: materials[name].in_plane.plane_stress for name in present}
+        self.stiffness = np.array([planes.get(name, np.zeros((3, 3))) for name in self.mesh.names])
         self.density = np.zeros(len(self.mesh.names))
         for name in present if any(load.gravity) else ():
             density = materials[name].density
@@ -378,9 +377,8 @@ class Level:
         thickness = problem.shape.thickness
         # Stiffness by axes: of strain d u_c / d x_a on stress along d, b.
         self._tensor = thickness * problem.stiffness[:, VOIGT[:, :, None, None], VOIGT[None, None]]
-        matrices, forces = self._matrices(), self.forces()
-        held, prescribed = self.supports()
-        self.field, self.residual, self.energy = self._solve(matrices, forces, held, prescribed)
+        forces, (held, given) = self.forces(), self.supports()
+        self.field, self.residual, self.energy = self._solve(forces, held, given)
         self.held, free = held, ~held
         forcing = max(np.abs(self.residual[held]).max(initial=0.0), np.abs(forces).max(initial=0.0))
         self.round_off = float(np.abs(self.residual[free]).max(initial=0.0) / forcing) if forcing else 0.0
@@ -449,8 +447,7 @@ class Level:
             if traction.group in space.mesh.named:
                 total[space.mesh.named[traction.group]] += traction.force
             else:
-                shares = self._shares(traction.group)
-                total += shares[:, None] * traction.force
+                total += self._shares(traction.group)[:, None] * traction.force
         for pressure in load.pressures:
             total -= pressure.pressure * thickness * self.integral(pressure.group, lambda _, normals: normals)
         if any(load.gravity):
@@ -470,8 +467,7 @@ class Level:
                 if value is None:
                     continue
                 if support.group in space.mesh.named:
-                    corners = np.array([space.mesh.named[support.group]])
-                    functions = corners
+                    functions = corners = np.array([space.mesh.named[support.group]])
                 else:
                     sides = [ends for ends, _ in self.group_sides(support.group)]
                     functions = np.unique(np.concatenate([space.on_side(ends) for ends in sides]))
@@ -487,15 +483,13 @@ class Level:
         check_held(space.mesh.points, space.edges, held[: len(space.mesh.points)], where)
         return held, values
 
-    def _solve(
-        self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, float]:
+    def _solve(self, forces: np.ndarray, held: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Return coefficients and residual forces, both (n_functions, 2), and the strain energy."""
-        space = self.space
+        space, matrices = self.space, self._matrices()
         n, outer = len(space.corners), 2 * space.n_local_outer
         numbers = (2 * space.numbers[:, :, None] + np.arange(2)).reshape(n, -1)
         free = ~held.ravel()
-        solution, load = np.where(held, prescribed, 0.0).ravel(), forces.ravel()
+        solution, load = np.where(held, given, 0.0).ravel(), forces.ravel()
         inner = numbers[:, outer:]
         coupled, stiff = matrices[:, outer:, :outer], matrices[:, outer:, outer:]
         eliminated = np.linalg.solve(stiff, np.concatenate([coupled, load[inner][:, :, None]], axis=2))

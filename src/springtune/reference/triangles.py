@@ -266,14 +266,13 @@ def outline_mesh(
         placed.update(on_it)
         pieces += piece.cut(sorted({0.0, 1.0, *on_it.values()}))
     mesh = _triangulated(shape.name, _refine_pieces(pieces, extent, largest_turn), names, extent)
-    for name, point in points.items():
-        where = np.array(point, dtype=float)
+    for name in sorted(points, key=lambda name: name not in placed):  # those on sides first
+        where = np.array(points[name], dtype=float)
         if name in placed:
             mesh.named[name] = int(np.argmin(np.linalg.norm(mesh.points - where, axis=1)))
             mesh.points[mesh.named[name]] = where
-    for name, point in points.items():
-        if name not in placed:
-            mesh.insert(name, np.array(point, dtype=float))
+        else:
+            mesh.insert(name, where)
     return mesh
 
 
@@ -287,7 +286,7 @@ def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], exten
     given[places.ravel()] = ends.reshape(-1, 2)
     lines = [(int(i), int(j), one.left, one.right) for one, (i, j) in zip(pieces, places.reshape(-1, 2))]
     remedy = "look for sides that meet or touch"
-    made = triangulate((given - origin) * scale, lines, repr(name), remedy, maxh=1.0, grading=0.5)
+    made = triangulate((given - origin) * scale, lines, repr(name), remedy=remedy, maxh=1.0, grading=0.5)
     points = made.points / scale + origin
     triangles, parts = made.triangles, made.regions - 1
 
