@@ -193,7 +193,7 @@ def estimates_hold(shape, monkeypatch):
     """Estimates bound the distance to a solution on shorter sides and of a tenth of the tolerance."""
     found = solve_shape(shape, shape.loads["press"], PLASTIC)
     with monkeypatch.context() as patch:
-        patch.setattr(shapes, "LARGEST_TURN", np.pi / 20)
+        patch.setattr(shapes.triangles, "LARGEST_TURN", np.pi / 20)
         fine = solve_shape(shape, shape.loads["press"], PLASTIC, tolerance=1e-5)
     for name in set(found.values) - set(found.negligible):
         both = found.error_estimates[name] + fine.error_estimates[name]

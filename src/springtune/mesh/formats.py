@@ -200,10 +200,9 @@ def _by_meshio(found: Any) -> Content:
     for kind, corners in content.cells:
         if len(corners) and (corners.shape[1:] != (CORNER_COUNTS[kind],) or corners.dtype.kind not in "iu"):
             raise ValueError(f"cells '{kind}' by numbers {corners.dtype} of shape {corners.shape}")
-    starts = content.starts()
     # Names with a colon are notes of a format, as of MED.
     content.cell_groups.update({name: [] for name in found.field_data if ":" not in name})
-    dimensions = np.repeat([min(CORNER_COUNTS[kind] - 1, 2) for kind, _ in content.cells], np.diff(starts))
+    dimensions = np.repeat([min(CORNER_COUNTS[kind] - 1, 2) for kind, _ in content.cells], np.diff(content.starts()))
     names = {tuple(map(int, one)): name for name, one in found.field_data.items() if len(one) == 2}
     data = [(key, np.concatenate(arrays), content.cell_groups) for key, arrays in found.cell_data.items()]
     data += [(key, np.asarray(values), content.point_groups) for key, values in found.point_data.items()]

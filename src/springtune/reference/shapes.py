@@ -13,22 +13,10 @@ from ..mesh.sheets import GroupedMesh, check_held
 from ..mesh.sides import in_words
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape, check_names
+from . import triangles
 from .answers import most_rotation_and_strain
 from .small_strain import ReferenceNotConvergedError
-from .triangles import (
-    LARGEST_TURN,
-    CoarseMesh,
-    Corner,
-    Side,
-    Space,
-    corners_of,
-    inverse_of,
-    is_unfolded,
-    outline_mesh,
-    shape_functions,
-    side_functions,
-    tabulated,
-)
+from .triangles import CoarseMesh, Corner, Side, Space
 
 #: Degrees of the first level and of the last one tried.
 LOWEST_DEGREE, HIGHEST_DEGREE = 2, 10
@@ -149,9 +137,8 @@ def solve_shape(
             bounds[name] = estimates[name] * scale
             why = refusal_reason(estimates[name], accepted, before, last)
             if why and not complaint:
-                shown = repr(name) if name else "the energy"
                 at = f"{estimates[name]:.1e} at degree {degree} ({level.unknowns} unknowns)"
-                complaint = f"{shown}{problem.place(name)}: relative error estimate {at}, {why}{problem.reason(name)}"
+                complaint = f"{problem.shown(name)}: relative error estimate {at}, {why}{problem.reason(name)}"
         if not complaint:
             rotation, strain = level.rotation_and_strain()
             found = {name: values[-1][name] for name in names}
@@ -225,13 +212,13 @@ class Problem:
         probed = {quantity.of for quantity in load.quantities} & set(self.points)
         corners = {name: tuple(self.points[name]) for name in sorted(used | probed)}
         for halvings in range(5):
-            self.mesh = outline_mesh(shape, grouped, corners, LARGEST_TURN / 2**halvings)
+            self.mesh = triangles.outline_mesh(shape, grouped, corners, triangles.LARGEST_TURN / 2**halvings)
             self._find_corners(materials, used, probed)
             graded = [self._graded.copy() for _ in range(LAYERS_CHECKED)]
             for layers, mesh in enumerate(graded):
                 for _ in range(layers):
                     mesh.grade(self.rough)
-            if all(is_unfolded(mesh) for mesh in (self.mesh, *graded)):
+            if all(triangles.is_unfolded(mesh) for mesh in (self.mesh, *graded)):
                 return
         raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
 
@@ -280,7 +267,7 @@ class Problem:
         def held(side: Side) -> bool:
             return not supported.keys().isdisjoint(side.groups)
 
-        self.corners = corners_of(self.mesh, condition, held, mirror)
+        self.corners = triangles.corners_of(self.mesh, condition, held, mirror)
         self.loaded_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
         rough = {point for point, corner in self.corners.items() if corner.rough}
         for name in used:
@@ -328,10 +315,10 @@ class Problem:
         self.reacting = [name for name in held if np.abs(level.residual[self.mesh.named[name]]).max() > least]
         self.infinite_energy = bool(self.loaded_points or self.reacting)
 
-    def place(self, name: str) -> str:
-        """Return the group or point of a quantity."""
+    def shown(self, name: str) -> str:
+        """Name of a quantity with its group or point, for messages."""
         of = self._quantities[name].of if name else ""
-        return f" of {of!r}" if of else ""
+        return (repr(name) if name else "the energy") + (f" of {of!r}" if of else "")
 
     def reason(self, name: str) -> str:
         """Why a quantity may not converge."""
@@ -392,19 +379,19 @@ class Level:
         result = np.empty((n, count, 2, count, 2))
         tensors = self._tensor[space.mesh.parts]
         straight = np.flatnonzero(~space.curved)
-        weights, _, gradients = tabulated(degree, 2 * degree - 2)
+        weights, _, gradients = triangles.tabulated(degree, 2 * degree - 2)
         jacobian, determinant = space.jacobians(gradients[:1], straight)
-        inverse = inverse_of(jacobian[:, 0], determinant[:, 0])
+        inverse = triangles.inverse_of(jacobian[:, 0], determinant[:, 0])
         products = np.einsum("q,qia,qjb->abij", weights, gradients, gradients, optimize=True)
         area = np.abs(determinant[:, 0])
         metric = np.einsum("eua,ecadb,evb,e->ecduv", inverse, tensors[straight], inverse, area, optimize=True)
         blocks = metric.reshape(-1, 4) @ products.reshape(4, -1)
         result[straight] = blocks.reshape(len(straight), 2, 2, count, count).transpose(0, 3, 1, 4, 2)
         curved = np.flatnonzero(space.curved)
-        weights, _, gradients = tabulated(degree, 2 * degree + 4)
+        weights, _, gradients = triangles.tabulated(degree, 2 * degree + 4)
         for rows in np.array_split(curved, max(1, len(curved) * gradients.size // 4_000_000)) if len(curved) else ():
             jacobian, determinant = space.jacobians(gradients, rows)
-            inverse = inverse_of(jacobian, determinant)
+            inverse = triangles.inverse_of(jacobian, determinant)
             slopes = np.einsum("qiu,equa->eaqi", gradients, inverse, optimize=True)
             weighted = slopes * (weights * np.abs(determinant))[:, None, :, None]
             flat = slopes.reshape(len(rows), -1, count)
@@ -423,7 +410,7 @@ class Level:
         """Integral over a group of the functions times vectors."""
         space, total = self.space, np.zeros((self.space.n_functions, 2))
         along, weights = np.polynomial.legendre.leggauss(space.degree + 3)
-        values, slopes = side_functions(space.degree, along)
+        values, slopes = triangles.side_functions(space.degree, along)
         for ends, sense in self.group_sides(group):
             functions = space.on_side(ends)
             at = space.places[functions]
@@ -451,7 +438,7 @@ class Level:
         for pressure in load.pressures:
             total -= pressure.pressure * thickness * self.integral(pressure.group, lambda _, normals: normals)
         if any(load.gravity):
-            weights, values, gradients = tabulated(space.degree, 3 * space.degree)
+            weights, values, gradients = triangles.tabulated(space.degree, 3 * space.degree)
             volume = weights * np.abs(space.jacobians(gradients)[1])
             shares = (volume @ values) * (thickness * problem.density[space.mesh.parts])[:, None]
             by_function = np.bincount(space.numbers.ravel(), shares.ravel(), space.n_functions)
@@ -558,7 +545,7 @@ class Level:
 
     def _at_quadrature(self, exact: int) -> tuple[np.ndarray, ...]:
         """Displacements' slopes by reference coordinates, derivatives and determinants of the map, and weights."""
-        weights, _, gradients = tabulated(self.space.degree, exact)
+        weights, _, gradients = triangles.tabulated(self.space.degree, exact)
         slopes = np.einsum("eic,qiu->eqcu", self.field[self.space.numbers], gradients, optimize=True)
         return slopes, *self.space.jacobians(gradients), weights
 
@@ -589,7 +576,7 @@ class Level:
     def rotation_and_strain(self) -> tuple[float, float]:
         """Rotation [rad] and strain [1] by which the solution is judged."""
         slopes, jacobian, determinant, weights = self._at_quadrature(4)
-        slopes = slopes @ inverse_of(jacobian, determinant)
+        slopes = slopes @ triangles.inverse_of(jacobian, determinant)
         return most_rotation_and_strain(slopes.reshape(-1, 2, 2), (weights * np.abs(determinant)).ravel())
 
     def _locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -602,14 +589,14 @@ class Level:
         found, local = np.zeros(len(points), dtype=int), np.empty((len(points), 2))
         deepest = np.full(len(points), -np.inf)
 
-        def look(triangles: np.ndarray, rows: np.ndarray) -> None:
+        def look(cells: np.ndarray, rows: np.ndarray) -> None:
             """Take triangles for points where these are deeper inside than before; pairs by ascending point."""
-            shares = np.einsum("pua,pa->pu", inverse[triangles], points[rows] - corners[triangles, 0])
-            depths = (np.column_stack([1 - shares.sum(axis=1), shares]) * heights[triangles]).min(axis=1)
+            shares = np.einsum("pua,pa->pu", inverse[cells], points[rows] - corners[cells, 0])
+            depths = (np.column_stack([1 - shares.sum(axis=1), shares]) * heights[cells]).min(axis=1)
             order = np.lexsort((depths, rows))
             last = order[np.flatnonzero(np.diff(rows[order], append=-1))]
             better = last[depths[last] > deepest[rows[last]]]
-            deepest[rows[better]], found[rows[better]] = depths[better], triangles[better]
+            deepest[rows[better]], found[rows[better]] = depths[better], cells[better]
             local[rows[better]] = shares[better]
 
         middles = corners.mean(axis=1)
@@ -623,7 +610,7 @@ class Level:
         for _ in range(20):
             if not len(curved):
                 break
-            values, gradients = shape_functions(space.degree, local[curved])
+            values, gradients = triangles.shape_functions(space.degree, local[curved])
             at = space.places[space.numbers[found[curved]]]
             off = np.einsum("pi,pic->pc", values, at) - points[curved]
             jacobian = np.einsum("pic,pia->pca", at, gradients)
@@ -640,12 +627,12 @@ class Level:
 
     def _displacements(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Displacements in triangles at reference coordinates [m], shape (n, 2)."""
-        values, _ = shape_functions(self.space.degree, local)
+        values, _ = triangles.shape_functions(self.space.degree, local)
         return np.einsum("pi,pic->pc", values, self.field[self.space.numbers[found]])
 
     def slopes(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Derivatives of displacements (component, axis) in triangles at reference coordinates, shape (n, 2, 2)."""
-        _, gradients = shape_functions(self.space.degree, local)
+        _, gradients = triangles.shape_functions(self.space.degree, local)
         numbers = self.space.numbers[found]
         jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
         return np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
