@@ -106,7 +106,8 @@ def stage(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module.__name__, module)
     files = [{"name": name, "tasks": [{"key": f"{name}{n}"} for n in (1, 2)]} for name in ("a", "b")]
     content = {"folder": str(tmp_path / "tested"), "files": files}
-    note = {"digest": hash_of("tested_stage", content), "module": "tested_stage", "content": content}
+    note = dict.fromkeys(("digest", "checksum"), hash_of("tested_stage", content))
+    note |= {"module": "tested_stage", "content": content}
     note["products"] = [str(tmp_path / f"tested/{name}.h5") for name in ("a", "b")]
     (tmp_path / "tasks").mkdir()
     (tmp_path / "tasks/tested_0.json").write_text(json.dumps(note))

@@ -319,6 +319,7 @@ class Stage:
     like: str = ""  # stage whose bundles it shares
     alone: bool = False  # whether a job has tasks of one name and the whole machine, to measure seconds
     endings: tuple[str, ...] = (".h5",)  # of the files of a result
+    unkeyed: tuple[str, ...] | None = None  # the only values of its tasks that are not in their keys, if known
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", self.folder or self.name)

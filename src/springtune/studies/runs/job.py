@@ -39,9 +39,10 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
 
 
 def _note(tasks: str, digest: str) -> dict[str, Any]:
-    """Note of a job, empty if it is of another one."""
+    """Note of a job, empty if it is of another one or damaged."""
     note = read_note(Path(tasks))
-    return note if hash_of(note.get("module"), note.get("content")) == digest else {}
+    whole = hash_of(note.get("module"), note.get("content")) == note.get("checksum")
+    return note if whole and note["digest"] == digest else {}
 
 
 def forget_job_of(product: Path, folder: Path) -> None:

@@ -40,6 +40,7 @@ def particles(area, mesh_size):
     return area / (0.866 * mesh_size**2)
 
 
+@cache
 def expected_seconds(particles, definition=""):
     """Expected seconds of a scene, a curve or a mesh; a definition that searches takes fifty times as long."""
     seconds = 5e-4 + 1e-7 * particles**1.5  # a factorization of a plane mesh
@@ -453,12 +454,14 @@ def _solve_tasks(study):
             yield Task(task, name=name, file=name, shared=shared, key=task["key"])
 
 
+UNKEYED = "keep_fields", "calibration"  # values of scenes that are not in their keys
+
 STAGES = (
     Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
     Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
     Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh"),
     Stage("calibrate", "studies.kinds.bodies.calibrate", lambda study: calibrations(study).values(), "curves"),
-    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh"),
+    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh", unkeyed=UNKEYED),
 )
 
 
