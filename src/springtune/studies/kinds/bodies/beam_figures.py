@@ -281,8 +281,10 @@ def plot_deformed(
     kept = fields.definition.values.tolist()
     definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
     cut, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
-    fields = fields.sel(selection | {"definition": definition})
-    values = _shown_swept(fields, root)
+    fields = fields.sel(selection | {"definition": definition}).drop_vars([*SWEPT], errors="ignore")
+    names = [name for name in SWEPT if f"{SHOWN_PREFIX}{name}" in fields]
+    # Nothing is kept of what has no value: any will do.
+    values = {name: fields[f"{SHOWN_PREFIX}{name}"].fillna(root[name].values[0]) for name in names}
     cut = at(cut.sel(definition=definition), values)
     shown = {_beam_title(root, name, values): (fields.sel(beam=name), cut.sel(beam=name)) for name in beams}
     extents = [extent(plane_vectors(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
@@ -290,15 +292,6 @@ def plot_deformed(
     said = f"lines: network ({definition}); grey: reference; dashed: at rest"
     title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
     return style.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
-
-
-def _shown_swept(fields, root):
-    """Swept values whose fields the dataset holds."""
-    names = [name for name in SWEPT if name in root.dims and f"{SHOWN_PREFIX}{name}" in fields]
-    coordinates = [name for name in root.dims if name in SWEPT]
-    # Nothing is kept of what has no value: any will do.
-    values = {name: fields[f"{SHOWN_PREFIX}{name}"].fillna(root[name].values[0]) for name in names}
-    return {name: value.drop_vars(coordinates, errors="ignore") for name, value in values.items()}
 
 
 def _draw_deformed(panel, part):
@@ -693,19 +686,13 @@ def _draw_errors_over_stiffness(panel, curves, root):
     return said, ""
 
 
-def _own_law_reference(cell, name):
-    """Label of a material's own reference: a solved one if there is any; None without a reference."""
-    laws, cell = own_laws(cell), in_own_plane(cell)
-    there = [law for law in laws if np.isfinite(cell[name].sel(reference=law).values).any()]
-    return next(iter(there or laws[::-1]), None)
-
-
 def _draw_pressed_face(panel, block, root, load):
     """Draw the pressed face over the reference of its kinematics; return notes, and the reason if nothing is drawn."""
     x, pressed, said = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")
-    law = _own_law_reference(pressed, "reference_face_profile")
+    laws, own = own_laws(pressed), in_own_plane(pressed).reference_face_profile
+    law = next(iter([law for law in laws if own.sel(reference=law).notnull().any()] or laws[::-1]), None)
     references, nonlinear = pressed.reference_face_profile, solved.sel(kinematics=solved.kinematics != "linear")
     finite = bool(law and references.sel(reference=law).notnull().any() and nonlinear.any())
     panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)")

@@ -46,12 +46,9 @@ def solve(curve, shared):
     reference = any_reference.read(folder, curve["reference"])
     why, wanted = objection(reference, force, curve["kinematics"]), force * reference.get("displacement", np.nan)
     best = meeting(path, force, stiffness, wanted, why)
-    return {
+    return {f"best_{name}": getattr(best, name) for name in ("stiffness", "status", "message")} | {
         "displacement": path.values,
         "stable": path.stable,
         "message": ending(path, force),
-        "best_stiffness": best.stiffness,
-        "best_status": best.status,
-        "best_message": best.message,
         "seconds": time.perf_counter() - begin,
     }

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from operator import attrgetter
@@ -85,6 +86,17 @@ def _allow_text(*texts: str) -> Any:
     return extend
 
 
+def or_text(texts: Mapping[str, dict[str, str]], refusal: str) -> Any:
+    """Validator of a section that may also be one of some texts, each with the keys that it stands for."""
+
+    def read(cls: type, value: object) -> object:
+        if isinstance(value, str) and value not in texts:
+            raise refuse(f"{show(value)} is {refusal}")
+        return texts[value] if isinstance(value, str) else value
+
+    return model_validator(mode="before")(classmethod(read))
+
+
 class SegmentConfig(Section):
     """A side, from its corner to the corner of the next side."""
 
@@ -145,14 +157,7 @@ class SupportConfig(Section):
     y: Displacement | None = None
     """Along y; free by default."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _fixed(cls, value: object) -> object:
-        if isinstance(value, str):
-            if value != "fixed":
-                raise refuse(f"{show(value)} is no support; give fixed, or displacements such as {{y: 0 mm}}")
-            return {"x": "0", "y": "0"}
-        return value
+    _fixed = or_text({"fixed": {"x": "0", "y": "0"}}, "no support; give fixed, or displacements such as {y: 0 mm}")
 
     @model_validator(mode="after")
     def _something(self) -> Self:
@@ -210,15 +215,10 @@ class QuantityConfig(Section):
     source: fields.Text | None = None
     """Source of the published value."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _alone(cls, value: object) -> object:
-        if isinstance(value, str):
-            if value not in ("area", "energy"):
-                example = "{displacement: y, at: tip}"
-                raise refuse(f"{show(value)} is no quantity; give area or energy, or what it is of, such as {example}")
-            return {value: "true"}
-        return value
+    _alone = or_text(
+        {name: {name: "true"} for name in ("area", "energy")},
+        "no quantity; give area or energy, or what it is of, such as {displacement: y, at: tip}",
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:

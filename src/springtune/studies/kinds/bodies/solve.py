@@ -85,13 +85,8 @@ def _solve_problem(about, springs, seconds, task):
     """Equilibrium of a scene and its stored values, with arrays if the task keeps fields."""
     begin = time.perf_counter()
     found = about.solve(springs)
-    result = {
-        "status": found.status,
-        "message": found.message,
-        "seconds": time.perf_counter() - begin,
-        "definition_seconds": seconds,
-        "negative_pivots": found.negative_pivots,
-    }
+    result = {"seconds": time.perf_counter() - begin, "definition_seconds": seconds}
+    result |= {name: getattr(found, name) for name in ("status", "message", "negative_pivots")}
     result |= {f"stiffness_{part}": value for part, value in about.sheet.typical_stiffness(springs).items()}
     if task.get("keep_fields") and found.equilibrium.converged:
         moved = found.equilibrium.displacements

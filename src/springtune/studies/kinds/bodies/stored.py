@@ -87,16 +87,13 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
         raise DamagedError(path, "it is damaged (its checksum is another one)")
     mesh = read_stored(path)
     count = {str(corners): len(cells) for corners, cells in mesh.cells.items()}
-    return GroupedMesh(
-        mesh,
-        {side: np.array(edges, dtype=np.int64).reshape(-1, 2) for side, edges in notes["sides"].items()},
-        {point: np.array(place) for point, place in notes["points"].items()},
-        {
-            part: {int(corners): np.isin(np.arange(count[corners]), inside) for corners, inside in cells.items()}
-            for part, cells in notes["parts"].items()
-        },
-        notes["unusable"],
-    )
+    sides = {side: np.array(edges, dtype=np.int64).reshape(-1, 2) for side, edges in notes["sides"].items()}
+    points = {point: np.array(place) for point, place in notes["points"].items()}
+    parts = {
+        part: {int(corners): np.isin(np.arange(count[corners]), inside) for corners, inside in cells.items()}
+        for part, cells in notes["parts"].items()
+    }
+    return GroupedMesh(mesh, sides, points, parts, notes["unusable"])
 
 
 # -- references --------------------------------------------------------------------------------------------------------

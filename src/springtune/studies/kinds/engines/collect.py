@@ -1,12 +1,13 @@
 """Scenes in engines, gathered in the groups ``/engines`` and ``/engine_curves``."""
 
-from collections import defaultdict
+from operator import itemgetter
 
 import numpy as np
 
 from ...config.model import declared_dimensions, declared_variables
 from ...output.dataset import Group
 from ...runs.plan import rows as stored_rows
+from ..bodies.kind import group_by
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
 
@@ -32,19 +33,17 @@ def groups(study, folder):
     for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
         rows = [row for run, row in found if run.of_curve == wanted]
         axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}
-        curves = defaultdict(list)
-        for row in rows if wanted else ():
-            curves[tuple(row[name] for name in RUN)].append((row[FACTOR], row))
-        rows += [dict(zip(RUN, setting)) | _best_factor(points) for setting, points in curves.items()]
+        curves = group_by(rows if wanted else (), itemgetter(*RUN))
+        rows += [dict(zip(RUN, setting)) | _best_factor(runs) for setting, runs in curves.items()]
         if rows:
             shared = {name: study.axes[name] for name in study.axes.keys() - ENGINE_DIMENSIONS.keys()}
             made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES, "program"])
     return made
 
 
-def _best_factor(points):
+def _best_factor(runs):
     """Factor at which the displacement equals the reference's, interpolated linearly in 1 / factor."""
-    known = sorted((factor, result["error"]) for factor, result in points if np.isfinite(result.get("error", np.nan)))
+    known = sorted((run[FACTOR], run["error"]) for run in runs if np.isfinite(run.get("error", np.nan)))
     found = []
     for (below, high), (above, low) in zip(known, known[1:]):
         if high * low <= 0 and high != low:
@@ -52,7 +51,7 @@ def _best_factor(points):
             found.append(1 / ((1 - share) / below + share / above))
     if found:
         return {"best_factor": min(found, key=lambda factor: abs(np.log(factor)))}
-    why = f"{len(known)} of {len(points)} runs came to rest; two are needed"
+    why = f"{len(known)} of {len(runs)} runs came to rest; two are needed"
     if len(known) > 1:
         factor, error = min(known, key=lambda one: abs(one[1]))
         why = f"no factor from {known[0][0]:g} to {known[-1][0]:g} is right; {factor:g} is off by {100 * error:+.3g} %"
