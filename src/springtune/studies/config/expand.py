@@ -38,15 +38,12 @@ def load(path: str | Path, kinds: tuple[StudyKind, ...]) -> Study:
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
     problems = Problems(file, lines, content, path.parent)
-    model = study_model(kinds)
-    if content is None:
-        problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
     files: list[str] = []
     add_rows(content, problems, files)
     # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
     given = content.items() if isinstance(content, dict) else ()
     sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: files}
-    config = validated(model, content, problems, context=sections)
+    config = validated(study_model(kinds), content, problems, context=sections)
     checks.check_names(config, problems)
     problems.stop()
     checks.check_scenes(config, problems)
@@ -90,7 +87,7 @@ def declared(config: StudyConfig, problems: Problems) -> Declared:
         try:
             materials[name] = material.material(name, problems.folder)
         except ValueError as error:
-            problems.add(("materials", name), str(error))
+            problems.add(("materials", name), str(error).removeprefix(f"material '{name}': "))
     problems.stop()
     return Declared(beams, materials, problems.folder)
 

@@ -141,15 +141,10 @@ class MaterialConfig(Section):
         for key in form:
             if getattr(self, key) is None:
                 raise refuse(f"'{key}' is missing; give {words(type(self).model_fields[key])}", key)
-        try:
-            if self.uniaxial_test is None:  # files are read by who knows where they are
-                self.material("material")
-        except ValueError as error:
-            raise refuse(str(error).removeprefix("material 'material': ")) from None
         return self
 
     def material(self, name: str, folder: Path = Path()) -> AnyMaterial:
-        """The material; its files are relative to a folder. Raises ValueError for a file that is not a test."""
+        """The material; its files are relative to a folder. Raises ValueError if there is none of these constants."""
         if self.uniaxial_test is not None:
             from springtune.problem.materials import fit_rubber
 
