@@ -7,14 +7,16 @@ interpolated; coefficients and error fall geometrically (Trefethen, Approximatio
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from ..problem.loads import LoadKind
-from .small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_unit
+
+if TYPE_CHECKING:
+    from .small_strain import ReferenceSolution
 
 TOLERANCE = 2e-5  # largest relative error estimate of an interpolant by default [1], a fifth of that of a reference
 
@@ -79,10 +81,12 @@ class Interpolant:
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
         most: int | None = None,
-        solve: Callable[..., ReferenceSolution] = solve_unit,
+        solve: Callable[..., "ReferenceSolution"] | None = None,
     ) -> Self:
         """Build an interpolant over a box of aspect ratios and Poisson's ratios, with as many solves as it needs."""
-        box = _Box(kind, aspect_range, nu_range, tolerance, most, solve)
+        from .small_strain import solve_unit  # here: who reads an interpolant does without scipy
+
+        box = _Box(kind, aspect_range, nu_range, tolerance, most, solve or solve_unit)
         values, error_estimate = box.certified()
         return cls(kind, aspect_range, nu_range, values, error_estimate, len(box.solved))
 
@@ -123,7 +127,7 @@ class _Box:
     nu_range: tuple[float, float]
     tolerance: float
     most: int | None
-    solver: Callable[..., ReferenceSolution]
+    solver: Callable[..., "ReferenceSolution"]
 
     def __post_init__(self) -> None:
         #: Answers in the order of `ANSWER_NAMES`, and error estimates, by place in the box (-1 to 1 on each axis).
@@ -162,6 +166,8 @@ class _Box:
 
     def _solve(self, places: list[tuple[float, float]]) -> tuple[np.ndarray, float]:
         """Answers, shape (n_places, 4), and the largest error estimate of them; what was solved is known."""
+        from .small_strain import ReferenceNotConvergedError
+
         # Elements are shared by those of one aspect ratio, which follow each other.
         for along, across in places:
             if (along, across) not in self.solved:
