@@ -354,7 +354,7 @@ def overview(tree: xr.DataTree) -> Content:
 def _errors(source: Source, data: xr.Dataset) -> Content:
     """What to type, errors of definitions, and errors over run time."""
     cells = requested_cells(data, source.error)
-    cells["percent"] = 100 * cells.valid_error.abs().clip(lower=SMALLEST_PERCENT / 100)
+    cells["percent"] = (100 * cells.valid_error.abs()).clip(lower=SMALLEST_PERCENT)
     typed = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
     content: Content = {"source": source, "finite_strain": "finite_strain" in data.attrs}
     content |= {"answers": typed[:MOST_ANSWERS], "further": len(typed) - MOST_ANSWERS}

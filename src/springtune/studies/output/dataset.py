@@ -19,8 +19,7 @@ from xarray.backends import H5NetCDFStore
 from xarray.conventions import cf_encoder, encode_dataset_coordinates
 
 from springtune.problem.compare import sign_sentence
-from springtune.problem.quantities import OF_BODIES, SWEPT, Status, shown_order
-from springtune.problem.shapes import beam_label
+from springtune.problem.quantities import SWEPT, Status
 from springtune.safe_io import replacing
 
 from ..config.model import EMPTY_VALUES, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
@@ -233,10 +232,9 @@ def tree(file: h5netcdf.File) -> xr.DataTree:
                 variables[name] = store.open_store_variable(name, stored)
                 if texts:
                     del variables[name].encoding["dtype"]  # by which xarray would read texts as wide as the longest
-                continue
-            # h5netcdf looks up all dimensions for each slice of numbers; a whole array takes no look.
-            values = stored[...] if texts else np.asarray(stored)
-            variables[name] = xr.Variable(stored.dimensions, values, _attributes(stored))
+            else:  # h5netcdf looks up all dimensions for each slice of numbers; a whole array takes no look
+                values = stored[...] if texts else np.asarray(stored)
+                variables[name] = xr.Variable(stored.dimensions, values, _attributes(stored))
         groups[group.name] = xr.decode_cf(xr.Dataset(variables, attrs=_attributes(group)))
         for one in (one for one in groups[group.name].variables.values() if one.nbytes <= LARGE_ARRAY_BYTES):
             one.load()
@@ -299,41 +297,7 @@ def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label 
     return chosen
 
 
-def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray]:
-    """Last swept values of each beam, material and load: what figures without a sweep show."""
-    names = [str(name) for name in present.dims if name in SWEPT and name != along]
-    if not names:
-        return {}
-    kept: list[str] = [name for name in ("beam", "material", "load") if name in present.dims]
-    there = present.any([name for name in present.dims if name not in (*kept, *names, along)])
-    if along in there.dims:
-        counts = there.sum(along)
-        together = int(counts.max()) == 1 and int((there.any(names).sum(along)).max()) > 1
-        kept += [along] if together else []
-        there = there if together else (counts > 0) & (counts == counts.max(names))
-    there = there.transpose(*kept, *names)
-    # What is shown rather than others comes last.
-    ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
-    there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
-    flat = there.values.reshape(*there.shape[: len(kept)], -1)
-    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), there.shape[len(kept) :])
-    coordinates = {name: there[name].values for name in kept}
-    return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
-
-
 SHOWN_PREFIX = "shown_"  # prefix of variables that hold the swept values of stored fields
-
-
-def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
-    """Select one swept value for each beam, material and load."""
-    chosen = {name: value for name, value in values.items() if name in data.dims}
-    if not chosen:
-        return data
-    found = data.sel(chosen)
-    for name in {*OF_BODIES.values()} & {*found.variables}:  # of a body, and so the same under all loads but for sweeps
-        body = name.partition("_")[0]
-        found[name] = found[name].isel({one: -1 for one in found[name].dims if one != body}, drop=True)
-    return found.reset_coords([name for name in chosen if name in found.coords])
 
 
 def sign_of_errors(data: xr.Dataset, reference: str = "reference_displacement") -> str:
@@ -404,14 +368,6 @@ def table_rows(
 
 def _quoted(labels: Iterable[object]) -> str:
     return ", ".join(repr(label) for label in labels) or "nothing"
-
-
-def labelled_beam(data: xr.Dataset, name: str) -> str:
-    """Beam name with its dimensions, see `springtune.problem.shapes.beam_label`."""
-    if "beam_length" not in data:
-        return str(name)
-    found = data.sel(beam=name) if "beam" in data.beam_length.dims else data
-    return beam_label(str(name), float(found.beam_length), float(found.beam_height))
 
 
 def network(data: xr.DataTree, labels: dict[str, Label]) -> xr.Dataset:

@@ -15,7 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.patches import Patch
 from matplotlib.text import Text
 from matplotlib.ticker import NullLocator
 
@@ -260,11 +259,6 @@ def add_title(figure: Figure | SubFigure | None, title: str, said: str = "") -> 
     if said:
         said = wrap_to_width(said, width - 0.2)
         figure.supxlabel(said, x=0.05 / width, ha="left", multialignment="left", fontsize=SMALL_TEXT, color="0.25")
-
-
-def swatches(colours: Mapping[str, str]) -> list[Patch]:
-    """Coloured boxes for a legend."""
-    return [Patch(facecolor=colour, edgecolor="0.3", linewidth=0.4, label=text) for text, colour in colours.items()]
 
 
 def small_multiples(

@@ -16,20 +16,17 @@ from ...output import style
 from ...output.answers import plane_vectors, status_words
 from ...output.dataset import (
     SHOWN_PREFIX,
-    at,
     cells,
     choose,
     group,
     in_own_plane,
-    labelled_beam,
     labels_of,
-    last_swept,
     own_laws,
     sign_of_errors,
 )
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .shape_figures import draw_network, extent, magnification
-from .tables import own_references
+from .tables import at, labelled_beam, last_swept, own_references
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
-from springtune.problem.quantities import SWEPT
+from springtune.problem.quantities import OF_BODIES, SWEPT, shown_order
+from springtune.problem.shapes import beam_label
 
 from ...output.dataset import STATUS, cells, group, in_own_plane, labels_of, like_with_like, records, table_rows
 from ...output.present import MOST_ROWS, error_decimals, head
@@ -30,6 +32,48 @@ def own_references(data):
     """Root with errors of nonlinear networks against references at finite strain, where there are any."""
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
     return like_with_like(group(data, "/"), finite)
+
+
+def last_swept(present, along=""):
+    """Last swept values of each beam, material and load: what figures without a sweep show."""
+    names = [str(name) for name in present.dims if name in SWEPT and name != along]
+    if not names:
+        return {}
+    kept = [name for name in ("beam", "material", "load") if name in present.dims]
+    there = present.any([name for name in present.dims if name not in (*kept, *names, along)])
+    if along in there.dims:
+        counts = there.sum(along)
+        together = int(counts.max()) == 1 and int((there.any(names).sum(along)).max()) > 1
+        kept += [along] if together else []
+        there = there if together else (counts > 0) & (counts == counts.max(names))
+    there = there.transpose(*kept, *names)
+    # What is shown rather than others comes last.
+    ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
+    there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
+    flat = there.values.reshape(*there.shape[: len(kept)], -1)
+    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), there.shape[len(kept) :])
+    coordinates = {name: there[name].values for name in kept}
+    return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
+
+
+def at(data, values):
+    """Select one swept value for each beam, material and load."""
+    chosen = {name: value for name, value in values.items() if name in data.dims}
+    if not chosen:
+        return data
+    found = data.sel(chosen)
+    for name in {*OF_BODIES.values()} & {*found.variables}:  # of a body, and so the same under all loads but for sweeps
+        body = name.partition("_")[0]
+        found[name] = found[name].isel({one: -1 for one in found[name].dims if one != body}, drop=True)
+    return found.reset_coords([name for name in chosen if name in found.coords])
+
+
+def labelled_beam(data, name):
+    """Beam name with its dimensions, see `springtune.problem.shapes.beam_label`."""
+    if "beam_length" not in data:
+        return str(name)
+    found = data.sel(beam=name) if "beam" in data.beam_length.dims else data
+    return beam_label(str(name), float(found.beam_length), float(found.beam_height))
 
 
 # -- scenes ------------------------------------------------------------------------------------------------------------

@@ -5,7 +5,8 @@ import pandas as pd
 
 from ...output import style
 from ...output.answers import count_statuses
-from ...output.dataset import at, choose, group, labelled_beam, labels_of, last_swept, sign_of_errors
+from ...output.dataset import choose, group, labels_of, sign_of_errors
+from ..bodies.tables import at, labelled_beam, last_swept
 
 
 def definitions(tree):

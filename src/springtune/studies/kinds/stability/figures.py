@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
 
 from springtune.safe_io import no_mathematics
 
@@ -32,6 +33,11 @@ def _experiment(data, name):
     data = group(data, "stability")
     choose(data.experiment != "", experiment=name)
     return data
+
+
+def _swatches(colours):
+    """Coloured boxes for a legend."""
+    return [Patch(facecolor=colour, edgecolor="0.3", linewidth=0.4, label=text) for text, colour in colours.items()]
 
 
 @style.styled
@@ -81,7 +87,7 @@ def plot_stability_maps(data, ax=None):
     shown = {SCHEMES.get(name, name.replace("-", " ").capitalize().replace("euler", "Euler")): name
              for name in data.integrator.values}  # fmt: skip
     said = "Damping ratio of the highest mode, mass-proportional damping; line: predicted limit"
-    title, key = "Behaviour of noise by time step and damping", style.swatches(BEHAVIOUR_COLOURS)
+    title, key = "Behaviour of noise by time step and damping", _swatches(BEHAVIOUR_COLOURS)
     return style.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, said=said, key=key)
 
 
@@ -138,7 +144,7 @@ def plot_stability_strains(data, ax=None):
         return [], "" if names else "No definition was solved under this load."
 
     seen = np.unique(data.strain_status.sel(definition=names)).astype(int)
-    key = style.swatches({STATUS[flag].replace("_", " "): STATUS_COLOURS[flag] for flag in seen})
+    key = _swatches({STATUS[flag].replace("_", " "): STATUS_COLOURS[flag] for flag in seen})
     said = "number: negative pivots; %: share of the load that is reached; f: flutter; path: unstable on the way"
     shown = {STRAIN_LOADS.get(load, load): load for load in data.strain_load.values}
     height = 0.6 + 0.19 * max(len(names), 2)
