@@ -158,10 +158,6 @@ def read_body(
     there = {**given, "material": given["material"] or constants}
     if missing := [text for name, text in MISSING.items() if name in needed and there[name] is None]:
         raise ValueError(*missing)  # each is a line
-    return _read_beam_options(given, load, sized)
-
-
-def _read_beam_options(given: Mapping[str, Any], load: str | None, sized: bool) -> BodyOptions:
     from ..mesh.cells import MESH_TYPES
     from ..scene.single import make_mesh, read_mesh
 
