@@ -260,26 +260,20 @@ EMPTY_VALUES |= {"int32": np.int32(0), "no node": np.int32(-1)}
 """Values of empty cells by their names in tables of variables."""
 
 
-def declared_variables(module: str, group: str = "", **dimensions: tuple[str, ...]) -> Variables:
-    """Variables by the table beside a module's file, of one of its groups; `dimensions` stand for names in it."""
-    found = {}
-    for row in _declared(module):
-        if row.get("group", "") == group and row["dimensions"] != row["name"]:
-            own = tuple(name for word in row["dimensions"].split() for name in dimensions.get(word, (word,)))
-            found[row["name"]] = own, row["units"], row["long_name"], EMPTY_VALUES[row["empty"]]
-    return found
+def declared(module: str, group: str = "", **names: tuple[str, ...]) -> dict[str, Any]:
+    """Variables of a group, and dimensions, by the table beside a module's file; `names` stand for several dimensions.
 
-
-def declared_dimensions(module: str) -> dict[str, str | tuple[str, str]]:
-    """Long names and units of the dimensions in the table beside a module's file: rows whose dimension is the name."""
-    return {
-        row["name"]: (row["long_name"], row["units"]) for row in _declared(module) if row["dimensions"] == row["name"]
-    }
-
-
-def _declared(module: str) -> list[dict[str, str]]:
+    A row whose dimension is its name declares a dimension.
+    """
+    variables, dimensions = {}, {}
     with Path(module).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
-        return [*csv.DictReader(file)]
+        for row in csv.DictReader(file):
+            if row["dimensions"] == row["name"]:
+                dimensions[row["name"]] = row["long_name"], row["units"]
+            elif row.get("group", "") == group:
+                own = tuple(one for word in row["dimensions"].split() for one in names.get(word, (word,)))
+                variables[row["name"]] = own, row["units"], row["long_name"], EMPTY_VALUES[row["empty"]]
+    return {"variables": variables, "dimensions": dimensions}
 
 
 @dataclass(frozen=True)

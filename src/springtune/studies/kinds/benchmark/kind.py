@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.model import Output, Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.model import Output, Stage, StudyKind, declared
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
@@ -149,8 +149,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=_axes,
     summary=lambda part: [["benchmark", len(part), "cases, timed one by one"]],
-    variables=declared_variables(__file__),
-    dimensions=declared_dimensions(__file__),
+    **declared(__file__),
     stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
     outputs=(
         Output("benchmark", "run time against error", _figures, plot=f"{FIGURES}:benchmark", shows="a benchmark"),

@@ -17,7 +17,7 @@ from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.model import Reference, Study, declared_dimensions, declared_variables, keeps_fields
+from ...config.model import Reference, Study, declared, keeps_fields
 from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING_ATTRIBUTES, UGRID, Group
 from ...runs import store
 from . import any_reference, stored
@@ -26,30 +26,26 @@ from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, pressed
 from .stored import FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
 
-MESH = ("beam", "mesh_type", "mesh_size")
-REFERENCE = ("beam", "material", "load")
-CELL = (*MESH, "material", "load")
-CURVE = (*CELL, "kinematics")
-SCENE = (*CELL, "definition", "kinematics")
+CELL = ("beam", "mesh_type", "mesh_size", "material", "load")
 
-DIMENSIONS = {"MESH": MESH, "REFERENCE": REFERENCE, "CELL": CELL, "CURVE": CURVE, "SCENE": SCENE}
+DIMENSIONS = {"MESH": CELL[:3], "REFERENCE": ("beam", "material", "load"), "CELL": CELL, "CURVE": (*CELL, "kinematics")}
+DIMENSIONS |= {"SCENE": (*CELL, "definition", "kinematics")}
 DIMENSIONS |= {"SHAPE_MESH": MESH_AXES, "SHAPE_CASE": CASE_AXES, "SHAPE_SCENE": SCENE_AXES}
 """Dimensions that the file gives one name."""
 
 
-def declared(group: str, **further: Any) -> Group:
+def _group(group: str, **further: Any) -> Group:
     """Group of the dataset with its variables and dimensions from the file, and `further` attributes."""
-    variables = declared_variables(__file__, group, **DIMENSIONS)
-    return Group(group, variables, declared_dimensions(__file__), {"applies": ("no", "yes")}, further)
+    return Group(group, **declared(__file__, group, **DIMENSIONS), flags={"applies": ("no", "yes")}, further=further)
 
 
 MESH_ATTRIBUTES = UGRID | dict.fromkeys(("spring_force", "stiffness"), SPRING_ATTRIBUTES)
 MESH_ATTRIBUTES |= {f"displacement_{axis}": PARTICLE_ATTRIBUTES for axis in "xy"}
 MESH_ATTRIBUTES |= {f"particle_reference_{axis}": PARTICLE_ATTRIBUTES for axis in "xy"}
 
-ROOT, SENSITIVITY = declared("/"), declared("/sensitivity")
-FINITE_STRAIN, BLOCK = declared("/finite_strain"), declared("/block")
-FIELDS = declared("/fields", **MESH_ATTRIBUTES)
+ROOT, SENSITIVITY = _group("/"), _group("/sensitivity")
+FINITE_STRAIN, BLOCK = _group("/finite_strain"), _group("/block")
+FIELDS = _group("/fields", **MESH_ATTRIBUTES)
 """Whole fields of the coarsest mesh of each beam and mesh type, by UGRID-1.0 without the padding of its arrays.
 
 The force of springs is not called "force", a dimension of the root where a study sweeps it.
@@ -60,9 +56,9 @@ MIXED_UNITS: dict[str, object] = {
     "units_variable": "quantity_units",
 }
 
-SHAPES = declared("/shapes", value=MIXED_UNITS, reference_value=MIXED_UNITS, expected_value=MIXED_UNITS)
-AT_FINITE_STRAIN = declared("/shapes_finite_strain", reference_value=MIXED_UNITS)
-SHAPE_FIELDS = declared("/shape_fields", **MESH_ATTRIBUTES)
+SHAPES = _group("/shapes", value=MIXED_UNITS, reference_value=MIXED_UNITS, expected_value=MIXED_UNITS)
+AT_FINITE_STRAIN = _group("/shapes_finite_strain", reference_value=MIXED_UNITS)
+SHAPE_FIELDS = _group("/shape_fields", **MESH_ATTRIBUTES)
 """Networks to draw: of each shape and load on one mesh, displacements and forces with seven digits."""
 
 PRINTED_PREFIX = "paper_"  # prefix of variables of printed cells, which have no swept dimensions

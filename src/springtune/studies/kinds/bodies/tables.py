@@ -234,8 +234,7 @@ def _in_fitting_unit(row):
 
 def _shape_table(tree):
     data = tree["shapes"].to_dataset()
-    present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
-    present = present.transpose(*SCENE_AXES, "quantity")
+    present = ((data.status != 0) & (data.quantity_kind != "")).transpose(*SCENE_AXES, "quantity")
     columns = {"mesh_size_mm": ("mesh_size", 1e3), "particles": ("particles", 1), "value": ("value", 1)}
     columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
     columns |= {f"{name}_percent": (name, 100) for name in SHAPE_ERRORS}

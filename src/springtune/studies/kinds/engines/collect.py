@@ -4,7 +4,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from ...config.model import declared_dimensions, declared_variables
+from ...config.model import declared
 from ...output.dataset import Group
 from ...runs.plan import rows as stored_rows
 from ..bodies.kind import group_by
@@ -17,14 +17,10 @@ RUN = ("scene", "definition", "engine", *SETTING)
 RUN_COORDINATES = [f"scene_{part}" for part in ("beam", "mesh_type", "mesh_size", "material", "load", "force")]
 """Variables that describe scenes."""
 
-ENGINE_DIMENSIONS = declared_dimensions(__file__)  # dimensions of these groups
-
-FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
-
-ENGINE_RUNS = Group("/engines", declared_variables(__file__, "runs", RUN=RUN), ENGINE_DIMENSIONS, FLAGS)
-CURVE_VARIABLES = declared_variables(__file__, "runs", RUN=(*RUN, FACTOR))
-CURVE_VARIABLES |= declared_variables(__file__, "best", RUN=RUN)
-ENGINE_CURVES = Group("/engine_curves", CURVE_VARIABLES, ENGINE_DIMENSIONS, FLAGS)
+FLAGS = {"engine_status": RUN_ENDS}
+ENGINE_RUNS = Group("/engines", **declared(__file__, "runs", RUN=RUN), flags=FLAGS)
+CURVES, BEST = declared(__file__, "runs", RUN=(*RUN, FACTOR)), declared(__file__, "best", RUN=RUN)
+ENGINE_CURVES = Group("/engine_curves", CURVES["variables"] | BEST["variables"], CURVES["dimensions"], FLAGS)
 
 
 def groups(study, folder):
@@ -36,7 +32,7 @@ def groups(study, folder):
         curves = group_by(rows if wanted else (), itemgetter(*RUN))
         rows += [dict(zip(RUN, setting)) | _best_factor(runs) for setting, runs in curves.items()]
         if rows:
-            shared = {name: study.axes[name] for name in study.axes.keys() - ENGINE_DIMENSIONS.keys()}
+            shared = {name: study.axes[name] for name in study.axes.keys() - CURVES["dimensions"].keys()}
             made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES, "program"])
     return made
 

@@ -74,8 +74,8 @@ def _draw_row(shape, area, elongation, laid, cell, names):
         elongation.axvline(reference, color="0.45", linewidth=1.5)
         style.add_note(elongation, [f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")])
     area.axvline(0, color="0.45", linewidth=1.5)
-    for panel, name in ((area, "area_error"), (elongation, "elongation")):
-        _draw_dots(panel, laid, names, name)
+    _draw_dots(area, laid, names, "area_error")
+    _draw_dots(elongation, laid, names, "elongation")
     area.set(xlabel="Error [%]", title="Area below the strip")
     elongation.set(xlabel="Elongation [%]", title="Lower fibre")
     elongation.tick_params(labelleft=False)

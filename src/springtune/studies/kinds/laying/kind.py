@@ -10,8 +10,8 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.model import Output, Stage, StudyKind, declared_dimensions, declared_variables
-from ...runs.keys import definition_key, material_key, mesh_type_key
+from ...config.model import Output, Stage, StudyKind, declared
+from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 
 LOADINGS = ("pressure", "gravity", "ends")
@@ -96,9 +96,8 @@ def _check(config, problems):
 def _expand(config, declared):
     """Labels and values of network strips, and of finite-element strips to compare with."""
     section = config.laying
-    beam = declared.beams[section.strip]
     shared = {
-        "strip": {"length": beam.length, "height": beam.height, "thickness": beam.thickness},
+        "strip": beam_key(declared.beams[section.strip]),
         "trapezoid": section.trapezoid.model_dump(),
         "material": material_key(declared.materials[section.material]),
         "support": material_key(declared.materials[section.support]),
@@ -129,8 +128,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in NETWORK},
     summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
-    variables=declared_variables(__file__),
-    dimensions=declared_dimensions(__file__),
+    **declared(__file__),
     stages=(Stage("laying", "studies.kinds.laying.solve", _tasks),),
     outputs=(
         Output("laying", "laid strips", lambda study: {"laying": {}}, plot=f"{FIGURES}:laying", shows="laid strips"),

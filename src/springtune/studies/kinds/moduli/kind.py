@@ -10,7 +10,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.model import MeshSpec, Output, Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.model import MeshSpec, Output, Stage, StudyKind, declared
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.plan import Task
 from ..bodies.kind import expected_seconds, mesh_key, mesh_source, parameters, particles
@@ -100,8 +100,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=lambda moduli: {"poisson_ratio": sorted({labels["poisson_ratio"] for labels in moduli[1]})},
     summary=_summary,
-    variables=declared_variables(__file__),
-    dimensions=declared_dimensions(__file__),
+    **declared(__file__),
     attributes=_attributes,
     stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),
     outputs=(Output("definitions", "comparison of definitions", _figures, plot=f"{FIGURES}:definitions", lack=_lack),),

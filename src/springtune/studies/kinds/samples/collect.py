@@ -13,7 +13,7 @@ from springtune.problem.quantities import Status
 from springtune.reference.answers import unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.model import declared_dimensions, declared_variables
+from ...config.model import declared
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
@@ -22,10 +22,8 @@ from .interpolate import problem_key
 from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
-DIMENSIONS, FLAGS = declared_dimensions(__file__), {"reference_applies": ("no", "yes")}
-
-SAMPLES = Group("/samples", declared_variables(__file__, "/samples"), DIMENSIONS, FLAGS)
-SOBOL = Group("/sobol", declared_variables(__file__, "/sobol"), DIMENSIONS)
+SAMPLES = Group("/samples", **declared(__file__, "/samples"), flags={"reference_applies": ("no", "yes")})
+SOBOL = Group("/sobol", **declared(__file__, "/sobol"))
 
 QUANTITIES = "displacement", "deformation_error", "best_stiffness"  # quantities with Sobol indices
 
@@ -112,17 +110,17 @@ def _unit_references(sample, drawn, folder, kind, aspects):
 
 def _coordinates(sample, drawn, dimensions):
     """Return the group with coordinates of each row, and their values: parameters, base sample and role."""
-    parts, variables, places = roles(sample.design, sample.varied), {}, {}
+    parts, further, places = roles(sample.design, sample.varied), {}, {}
     for name, values in drawn.items():
         # A coordinate must not have the name of a dimension that it does not run along, here or in the root.
         own = f"sample_{name}" if name in dimensions else name
-        variables[own], places[own] = (("sample",), PARAMETERS[name][2], PARAMETERS[name][1], np.nan), values
-    variables["base"] = ("sample",), "1", "base sample that the row belongs to", np.int32(0)
+        further[own], places[own] = (("sample",), PARAMETERS[name][2], PARAMETERS[name][1], np.nan), values
+    further["base"] = ("sample",), "1", "base sample that the row belongs to", np.int32(0)
     places["base"] = np.repeat(range(sample.size), sample.each)
     if len(parts) > 1:
-        variables["role"] = ("sample",), "1", "part of the base sample: A, B, or A with one parameter of B", 0
+        further["role"] = ("sample",), "1", "part of the base sample: A, B, or A with one parameter of B", 0
         places["role"] = np.tile(range(len(parts)), sample.size)
-    return replace(SAMPLES, variables=SAMPLES.variables | variables, flags=FLAGS | {"role": tuple(parts)}), places
+    return replace(SAMPLES, variables=SAMPLES.variables | further, flags=SAMPLES.flags | {"role": tuple(parts)}), places
 
 
 def _indices(sample, data):

@@ -10,7 +10,7 @@ from springtune.mesh.cells import MESH_TYPES
 from ...config import fields
 from ...config.checks import check_able, check_beam_material, check_density, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.model import Output, Stage, StudyKind, declared_dimensions, declared_variables
+from ...config.model import Output, Stage, StudyKind, declared
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.plan import Task
 from . import AXES, DEFINITION_FREE, EXPERIMENTS
@@ -110,8 +110,7 @@ KIND = StudyKind(
     expand=_expand,
     axes=_axes,
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
-    variables=declared_variables(__file__),
-    dimensions=declared_dimensions(__file__),
+    **declared(__file__),
     flags={"behaviour": BEHAVIOURS},
     sparse=True,
     stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
