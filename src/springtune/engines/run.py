@@ -274,7 +274,6 @@ def in_engine(
     net, places = net_of(scene, number(factor, "factor")), np.arange(len(scene.mesh.points))
     if order:
         net, places = reordered(net, order)
-    chosen.check(setting, net)
     frequency = scene.motion().loaded_frequency * factor**0.5
     damping = 2 * frequency if damping is None else damping
     session = chosen.start(net, setting, damping)

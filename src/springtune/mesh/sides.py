@@ -44,14 +44,15 @@ def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     return np.asarray(way[..., 0] * there[..., 1] - way[..., 1] * there[..., 0])
 
 
+def away(point: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """Distance of points from edges from `one` to `two`, all (n, 2) [m]."""
+    along = two - one
+    share = np.clip(((point - one) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(point - one - share[:, None] * along, axis=1))
+
+
 def _edge_distances(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Distance of each edge from a to b from the one from c to d [m]."""
-
-    def away(point: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
-        along = two - one
-        share = np.clip(((point - one) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(point - one - share[:, None] * along, axis=1))
-
     crossing = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
     distance = np.min([away(a, c, d), away(b, c, d), away(c, a, b), away(d, a, b)], axis=0)
     return np.where(crossing, 0.0, distance)

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..mechanics.continuum import cell_stresses, particle_stresses
+from ..mechanics.energies import area_slopes
 from ..mechanics.network import FollowerPressure, Network
 from ..mesh.cells import Mesh
 from ..mesh.sheets import GroupedMesh, box_fault, part_names, parts_of
-from ..mesh.sides import OutlineSide, in_words
+from ..mesh.sides import OutlineSide, away, in_words
 from ..problem import boundary
 from ..problem.loads import LOADS, Load, LoadKind
 from ..problem.materials import AnyMaterial, Material, of_parts
@@ -236,8 +237,6 @@ class BeamProblem(BoundaryProblem):
 class ShapeProblem(BoundaryProblem):
     """A shape under one of its load cases, times `scale` [1]."""
 
-    scale: float
-
     def __init__(
         self,
         shape: Shape,
@@ -258,8 +257,8 @@ class ShapeProblem(BoundaryProblem):
             warn_of_body(np.ptp(self.mesh.points, axis=0), shape.thickness, f"shape {shape.name!r}")
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
-        self.scale, self.force = float(scale), 1.0
-        self.size = abs(self.scale)
+        self.scale: float = float(scale)
+        self.size, self.force = abs(self.scale), 1.0
         self.case = scaled(choose(shape.loads, load, "load"), self.scale)
         self.load, self.sheet = self.case.name, sheet_of(self.mesh, self.thickness, sheet)
         if not self.case.quantities:
@@ -382,8 +381,7 @@ def _growth(mesh: Mesh, displacements: np.ndarray, linear: bool) -> float:
     for corners in mesh.cells.values():
         moved = displacements[corners] - displacements[corners[:, :1]]
         middle = mesh.points[corners] + (0.0 if linear else 0.5 * moved)
-        x, y = (np.roll(middle, -1, axis=1) - np.roll(middle, 1, axis=1)).transpose(2, 0, 1)
-        total += 0.5 * float((moved[..., 0] * y - moved[..., 1] * x).sum())
+        total += float((area_slopes(middle.T) * moved.T).sum())
     return total
 
 
@@ -422,9 +420,9 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
         if name not in grouped.sides or not own:
             continue
         ends = mesh.points[grouped.sides[name]]
-        away = np.min([_distances(side, ends.reshape(-1, 2)) for side in own], axis=0)
+        apart = np.min([_distances(side, ends.reshape(-1, 2)) for side in own], axis=0)
         share = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / sum(side.length_to(1.0) for side in own)
-        if away.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + MOST_DISTANCE_FROM_SIDE:
+        if apart.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + MOST_DISTANCE_FROM_SIDE:
             raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of {what}; {remedy}")
     for name, point in shape.points.items():
         if name in grouped.points and np.linalg.norm(np.subtract(grouped.points[name], point)) > small:
@@ -447,16 +445,13 @@ def _between(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> np.n
 def _distances(side: OutlineSide, points: np.ndarray) -> np.ndarray:
     """Distances of points from a side [m], shape (n,); on an ellipse only for points close to it."""
     if side.arc is None or side.centre is None:
-        start, along = np.array(side.start), np.subtract(side.end, side.start)
-        shares = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
-        nearest = start + shares[:, None] * along
-    else:
-        axes, (begin, turn) = np.array(side.arc[:2]), side.arc[2:]
-        x, y = ((points - side.centre) / axes).T
-        # From the middle of the arc, so that no turn is cut.
-        from_middle = np.mod(np.arctan2(y, x) - begin - 0.5 * turn + np.pi, 2 * np.pi) - np.pi
-        angles = begin + 0.5 * turn + np.clip(from_middle, -0.5 * abs(turn), 0.5 * abs(turn))
-        nearest = np.array(side.centre) + axes * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return away(points, np.array([side.start]), np.array([side.end]))
+    axes, (begin, turn) = np.array(side.arc[:2]), side.arc[2:]
+    x, y = ((points - side.centre) / axes).T
+    # From the middle of the arc, so that no turn is cut.
+    from_middle = np.mod(np.arctan2(y, x) - begin - 0.5 * turn + np.pi, 2 * np.pi) - np.pi
+    angles = begin + 0.5 * turn + np.clip(from_middle, -0.5 * abs(turn), 0.5 * abs(turn))
+    nearest = np.array(side.centre) + axes * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.asarray(np.linalg.norm(points - nearest, axis=1))
 
 
