@@ -180,7 +180,7 @@ def _answer_for_engine(sheet: dict[str, Any], asked: dict[str, Any], loads: list
     from ..engines.base import ENGINES, EngineError, Setting
     from ..engines.calibration import best_runnable_scene, fit_engine
     from ..prediction.choices import USUAL_LOADS
-    from ..scene.mesh_cache import choose
+    from ..problem.quantities import choose
     from ..scene.single import Scene
     from .recommendation import fit_text
 

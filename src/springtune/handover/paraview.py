@@ -24,9 +24,7 @@ def write_vtu(
     """Write points [m] and cells, by number of corners, with their data; the file appears whole or not at all."""
 
     def flat(values: np.ndarray) -> np.ndarray:
-        if values.ndim == 1:
-            return values
-        return np.column_stack([values, np.zeros(len(values), dtype=values.dtype)])
+        return values if values.ndim == 1 else np.pad(values, ((0, 0), (0, 1)))
 
     present = {count: corners for count, corners in cells.items() if len(corners)}
     data = {}

@@ -15,12 +15,12 @@ from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text, quantity_errors
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import Status, nearest
+from ..problem.quantities import Status, choose, nearest
 from ..problem.shapes import Beam, Shape
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
-from ..scene.mesh_cache import MeshCache, choose, is_a
+from ..scene.mesh_cache import MeshCache, is_a
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 

@@ -27,7 +27,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..safe_io import csv_rows, numbers
-from .quantities import PLANES, Number, positive, put, quantity, whole
+from .quantities import PLANES, Number, choose, positive, put, quantity, whole
 
 INCOMPRESSIBLE = (
     "0.5: in plane strain an incompressible material has no finite stiffness; give a ratio below 0.5 such as 0.49, or "
@@ -86,8 +86,7 @@ class Material:
 
     def __post_init__(self) -> None:
         _read_density(self)
-        if self.plane not in PLANES:
-            raise ValueError(f"plane: {self.plane!r} is unknown; give {' or '.join(map(repr, PLANES))}")
+        choose(dict.fromkeys(PLANES), self.plane, "plane")
         put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
             given = f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}"
@@ -128,7 +127,10 @@ class InPlane(Material):
 
 
 RUBBER_TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
-"""Tests, and the power p of the nominal stress 2 (q - q^-p) W'(I_1) of an incompressible sheet."""
+"""Tests, and the power p of the nominal stress 2 (q - q^-p) W'(I_1) of an incompressible sheet.
+
+Stretched by q, it is q^((p - 3) / 2) times as wide in its plane.
+"""
 
 MOST_TERMS = 3  # terms of Yeoh's law
 
@@ -195,7 +197,9 @@ class Rubber(Material):
         given = list(coefficients)
         if not (1 <= len(given) <= MOST_TERMS and all(isinstance(c, Real) and math.isfinite(c) for c in given)):
             raise ValueError(f"coefficients: {coefficients!r} is no law; give 1 to {MOST_TERMS} numbers in Pa")
-        errors = tuple((_known_test(test), float(error)) for test, error in test_errors)
+        for test, _ in test_errors:
+            choose(RUBBER_TESTS, test, "test")
+        errors = tuple((test, float(error)) for test, error in test_errors)
         put(self, coefficients=tuple(map(float, given)), largest=float(largest), test_errors=errors)
         put(self, young_modulus=6 * self.coefficients[0], poisson_ratio=0.5, density=density, name=name)
         self.__post_init__()
@@ -227,7 +231,7 @@ class Rubber(Material):
             If the test is unknown.
         """
         q = np.asarray(stretch, float)
-        other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
+        other = q ** (0.5 * (choose(RUBBER_TESTS, test, "test") - 3))
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
@@ -576,12 +580,6 @@ def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     if not isinstance(material, Material):
         raise ValueError(f"material: {material.name!r} is anisotropic, and beams are of isotropic ones; {remedy}")
     return material
-
-
-def _known_test(test: str) -> str:
-    if test not in RUBBER_TESTS:
-        raise ValueError(f"test: {test!r} is unknown; known: {', '.join(RUBBER_TESTS)}")
-    return test
 
 
 def _read_density(material: AnyMaterial) -> None:

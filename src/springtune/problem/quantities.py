@@ -1,11 +1,13 @@
 """User input: quantities as texts with units or numbers in SI units, known names, swept parameters; the status."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from enum import IntEnum
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeVar
+
+Entry = TypeVar("Entry")
 
 Number = float | Any  # A number in SI units, for which a text with its unit may be given as well
 
@@ -80,6 +82,13 @@ def nearest(word: str, words: Iterable[str]) -> str:
     hint = f"did you mean '{near[0]}'? " if near else ""
     more = f" and {len(words) - MOST_WORDS} more" if len(words) > MOST_WORDS else ""
     return f"{hint}known: {', '.join(words[:MOST_WORDS])}{more}"
+
+
+def choose(known: Mapping[str, Entry], name: object, what: str) -> Entry:
+    """Return the entry of a mapping; for another name raise ValueError with the known ones."""
+    if isinstance(name, str) and name in known:
+        return known[name]
+    raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
 SWEPT = {

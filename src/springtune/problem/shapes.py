@@ -22,7 +22,7 @@ from typing import Any
 
 from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, find_meeting, in_words, reverse_round, winds_about
 from ..registry import NAME, NAME_RULE
-from .quantities import Number, nearest, positive, put, quantity
+from .quantities import Number, choose, nearest, positive, put, quantity
 
 
 class AssumptionWarning(UserWarning):
@@ -437,10 +437,7 @@ class Quantity:
     def __post_init__(self) -> None:
         _check_name(self.name, "quantity")
         what = f"quantity {self.name!r}"
-        if self.kind not in COMPONENTS:
-            raise ValueError(f"{what}: unknown kind {self.kind!r}; {nearest(str(self.kind), COMPONENTS)}")
-        components = COMPONENTS[self.kind]
-        if components:
+        if components := choose(COMPONENTS, self.kind, f"{what}, kind"):
             _check_name(self.of, f"{what}, of")
             if self.component not in components:
                 raise ValueError(f"{what}: component {self.component!r}; give one of {', '.join(components)}")

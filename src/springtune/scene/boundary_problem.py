@@ -18,11 +18,11 @@ from ..mesh.sides import OutlineSide, away, in_words
 from ..problem import boundary
 from ..problem.loads import LOADS, Load, LoadKind
 from ..problem.materials import AnyMaterial, Material, of_parts
-from ..problem.quantities import positive
+from ..problem.quantities import choose, positive
 from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_body
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
-from .mesh_cache import Loading, MeshCache, Solution, choose, is_a, solve_and_judge
+from .mesh_cache import Loading, MeshCache, Solution, is_a, solve_and_judge
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution

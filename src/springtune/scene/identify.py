@@ -17,13 +17,13 @@ from scipy.stats import f, t
 
 from ..mesh.sheets import parts_of
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, TestDataError, rotated
-from ..problem.quantities import Number, nearest, positive
+from ..problem.quantities import Number, choose, nearest, positive
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
 from ..safe_io import Tabled, number_of
 from .measured import Block, MeasuredTest, blocks, body_of_test
-from .mesh_cache import choose, is_a
+from .mesh_cache import is_a
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,11 +12,11 @@ from ..mesh.formats import read_shape
 from ..mesh.sheets import GroupedMesh
 from ..problem.loads import LOADS, MIDDLE, Side
 from ..problem.materials import TestDataError
-from ..problem.quantities import Number, nearest, positive, put, quantity
+from ..problem.quantities import Number, choose, nearest, positive, put, quantity
 from ..problem.shapes import Beam, LoadCase, Segment, Shape
 from ..reference.by_constants import Family
 from ..safe_io import csv_rows, number_of, numbers
-from .mesh_cache import choose, is_a
+from .mesh_cache import is_a
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")
 """Columns of a field, and those that a curve has at least."""

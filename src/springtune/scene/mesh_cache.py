@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from math import inf
-from typing import Any, TypeVar, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ..mesh.sheets import GroupedMesh
 from ..problem.boundary import box, displacement_weights, even, supported
 from ..problem.loads import LoadKind
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
-from ..problem.quantities import Status, nearest, positive
+from ..problem.quantities import Status, choose, positive
 from ..problem.shapes import Beam, Shape
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
@@ -41,8 +41,6 @@ EXAMPLES: dict[type, str] = {
 AnyDefinition = str | Definition | Callable[..., Springs]
 """Definition, its name, or a function (mesh, material, thickness) -> Springs."""
 
-Entry = TypeVar("Entry")
-
 
 def definition_of(definition: AnyDefinition) -> Definition:
     """Definition by its name, or of a function (mesh, material, thickness) -> Springs."""
@@ -52,13 +50,6 @@ def definition_of(definition: AnyDefinition) -> Definition:
         name = getattr(definition, "__name__", type(definition).__name__)
         return Definition(name, definition, inf, False, (3, 4), False, "", True, False)
     return choose(DEFINITIONS, definition, "definition")
-
-
-def choose(known: Mapping[str, Entry], name: object, what: str) -> Entry:
-    """Entry of a mapping, or an error that lists the known names."""
-    if isinstance(name, str) and name in known:
-        return known[name]
-    raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
 def is_a(value: object, wanted: Any, name: str) -> None:

@@ -11,11 +11,11 @@ from ..mechanics.continuum import PatchTest
 from ..mesh.cells import Mesh
 from ..mesh.sheets import bonded
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import positive, whole
+from ..problem.quantities import choose, positive, whole
 from ..safe_io import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
-from .mesh_cache import AnyDefinition, MeshCache, choose, definition_of, is_a, naming_errors
+from .mesh_cache import AnyDefinition, MeshCache, definition_of, is_a, naming_errors
 
 START_DEFINITIONS = ("van-gelder", "lattice", "energy-fit")  # definitions from whose springs searches start
 

@@ -21,13 +21,13 @@ from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text, quantity_errors, sign_word
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
-from ..problem.quantities import Status, positive
+from ..problem.quantities import Status, choose, positive
 from ..problem.shapes import QUANTITY_UNITS, AssumptionWarning, Beam, Shape
 from ..registry import hook
 from ..safe_io import Tabled, number_text
 from ..springs.base import Springs
 from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
-from .mesh_cache import AnyDefinition, MeshCache, choose, definition_of, given_stiffness, is_a, naming_errors
+from .mesh_cache import AnyDefinition, MeshCache, definition_of, given_stiffness, is_a, naming_errors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
