@@ -168,12 +168,12 @@ def _describe(node: xr.DataTree, root: xr.Dataset) -> dict[str, Any]:
             beyond, number = (stored == Status.SOLVED) & (data.reference_applies.variable == 0), len(row["flags"])
             row["flags"] |= {str(number): "beyond_linear"} if beyond.any() else {}
             values = np.where(beyond.transpose(*stored.dims), number, values)
-        elif ERROR.search(name) and row.get("units", "1") == "1":
+        elif ERROR.search(row["name"]) and row.get("units", "1") == "1":
             row["error"] = True
             if _has_sign(row, values):
-                row |= {"signed": True, "sign": _sign_sentence(name, data, root)}
+                row |= {"signed": True, "sign": _sign_sentence(row["name"], data, root)}
         rows.append(row | _pack(values))
-    dims = [{"name": name, "size": size} for name, size in node.to_dataset(inherit=False).sizes.items()]
+    dims = [dict[str, Any](name=name, size=size) for name, size in node.to_dataset(inherit=False).sizes.items()]
     for dim in dims:
         if (name := dim["name"]) in data.coords:
             dim |= {"labels": list(map(_json_value, data[name].values.tolist()))} | _words_on(data[name].variable)
@@ -235,7 +235,8 @@ def _pack(values: np.ndarray) -> dict[str, Any]:
     row: dict[str, Any] = {"type": "integer"}
     if values.dtype.kind not in "iubf":
         # No array of texts, which gives each the room of the longest one.
-        places, words = pd.factorize(np.where(values == "", None, values.astype(object)).ravel(), sort=True)
+        texts = pd.Series(values.ravel(), dtype=object)
+        places, words = pd.factorize(texts.mask(texts == ""), sort=True)
         row, values = {"type": "text", "words": ["", *map(str, words)]}, places.reshape(values.shape) + 1
     elif values.dtype.kind == "f" or values.size and max(-int(values.min()), int(values.max())) >= 2**31:
         row = {"type": "float"}
@@ -335,7 +336,7 @@ class Chart(NamedTuple):
 def overview(tree: xr.DataTree) -> Content:
     """Content of the overview of a dataset."""
     found, groups = [], {node.path: node.to_dataset() for node in tree.subtree}
-    root, curves = groups["/"], groups.get("/sensitivity", {})
+    root, curves = groups["/"], groups.get("/sensitivity", xr.Dataset())
     for source in SOURCES:
         data = groups.get(source.group, xr.Dataset())
         if {source.error, "status", "definition"} <= {*data.variables}:

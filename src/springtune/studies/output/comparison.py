@@ -73,7 +73,8 @@ class VariableChanges(NamedTuple):
     rows: list[Change]
 
 
-class CellsOfOne(NamedTuple):
+@dataclass(frozen=True)
+class CellsOfOne:
     """Cells of only one dataset: their number, and the labels of the first."""
 
     count: int = 0

@@ -56,16 +56,16 @@ class Group:
     name: str
     variables: dict[str, tuple[tuple[str, ...], str, str, float | str | np.number[Any]]]
     dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
-    flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    flags: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     further: dict[str, dict[str, object]] = field(default_factory=dict)
 
     def empty(self, axes: Axes, names: Collection[str] | None = None) -> xr.Dataset:
         """Create the dataset with empty cells."""
         chosen = {name: row for name, row in self.variables.items() if names is None or name in names}
-        data, used = {}, set()
+        data, coordinates = {}, {}
         for name, (dimensions, units, long_name, nothing) in chosen.items():
             shape = [len(axes[dimension]) for dimension in dimensions]
-            meanings = self.flags.get(name) or ({"status": STATUS} | self.flags).get(name.rpartition("_")[2])
+            meanings = self.flags.get(name) or {"status": STATUS, **self.flags}.get(name.rpartition("_")[2])
             dtype = "int8" if meanings else object if isinstance(nothing, str) else None
             values = np.full(shape, nothing, dtype=dtype)
             attributes: dict[str, object] = {"long_name": long_name, "units": units}
@@ -74,10 +74,8 @@ class Group:
                 attributes["flag_meanings"] = " ".join(meanings)
             # As it is: looking for dates among millions of texts costs more than the texts.
             data[name] = xr.Variable(dimensions, values, attributes | self.further.get(name, {}), fastpath=True)
-            used |= set(dimensions)
-        coordinates = {}
         for dimension, words in (DIMENSIONS | self.dimensions).items():
-            if dimension in used:
+            if any(dimension in dimensions for dimensions, *_ in chosen.values()):
                 long_name, units = words if isinstance(words, tuple) else (words, "1")
                 values = np.array(axes[dimension])
                 values = values.astype(object) if values.dtype.kind == "U" else values
@@ -302,7 +300,7 @@ SHOWN_PREFIX = "shown_"  # prefix of variables that hold the swept values of sto
 
 def sign_of_errors(data: xr.Dataset, reference: str = "reference_displacement") -> str:
     """Sentence on which sign of errors means too soft, by loads or else quantities; empty without any reference."""
-    signs = np.sign(data.get(reference, xr.DataArray()))
+    signs: xr.DataArray = xr.apply_ufunc(np.sign, data.get(reference, xr.DataArray()))
     if "quantity_kind" in data:
         signs = signs.where(data.quantity_kind == "displacement")
     known = signs.values[np.isfinite(signs.values) & (signs.values != 0)]

@@ -79,8 +79,8 @@ def write_scenes(tree: xr.DataTree, folder: Path) -> None:
     units = {name: str(fields[name].attrs.get("units", "1")) for name in order}
     for labels in cells(solved, order):
         name = cell_text(labels, units).replace(", ", "_").replace(" ", "") + ".vtu"
-        _write_scene(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", "")} | labels)
-        rows.append({"file": name} | labels)
+        _write_scene(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", ""), **labels})
+        rows.append({"file": name, **labels})
     write_text(folder / "scenes.csv", pd.DataFrame(rows, columns=["file", *units]).to_csv(index=False))
 
 

@@ -80,7 +80,7 @@ def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, dict
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == "/" else ", ".join(filter(None, (name.strip("/"), part)))
         said = ", ".join(f"{count} {word}" for word, count in count_statuses(flags).items())
-        yield what, np.count_nonzero(flags), said, lost
+        yield what, int(np.count_nonzero(flags)), said, lost
 
 
 def _cells(data: "xr.Dataset", there: "xr.DataArray", message: str) -> Cells:
