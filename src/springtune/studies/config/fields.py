@@ -286,6 +286,6 @@ def default(value: Any, **options: Any) -> Any:
     return Field(value, validate_default=True, **options)
 
 
-def optional(section: Any, description: str) -> tuple[Any, Any]:
+def optional(section: Any, description: str, **options: Any) -> tuple[Any, Any]:
     """Type and field of a section that a study may leave out."""
-    return section | None, Field(None, description=description)
+    return section | None, Field(None, description=description, **options)

@@ -581,11 +581,10 @@ def _pressing_load(names):
 def block(tree):
     """Stem, plotting function and selection of the block's figure: last material and beam, finest structured mesh."""
     present = group(tree, "/").status != 0
-    present = present.sel(load=[_pressing_load(labels_of(present, "load"))])
-    types = labels_of(present, "mesh_type")
-    selection = {"mesh_type": "structured" if "structured" in types else types[0]}
-    present = present.sel(mesh_type=[selection["mesh_type"]])
-    for name, place in (("material", -1), ("beam", -1), ("mesh_size", 0)):
+    load, selection = _pressing_load(labels_of(present, "load")), {}
+    types = sorted(present.mesh_type.values, key=lambda name: name != "structured")
+    present = present.sel(load=[load], mesh_type=types)
+    for name, place in (("mesh_type", 0), ("material", -1), ("beam", -1), ("mesh_size", 0)):
         selection[name] = labels_of(present, name)[place]
         present = present.sel({name: [selection[name]]})
     yield "block", plot_block, selection

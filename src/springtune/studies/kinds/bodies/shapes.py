@@ -36,7 +36,7 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import FEWER, check_able, check_density, check_particles
 from ...config.expand import FROM_THE_STUDY
-from ...config.fields import Named, OneOrMore, Section, default, one_of, quantity, read_quantity
+from ...config.fields import Named, OneOrMore, Section, default, one_of, optional, quantity, read_quantity
 from ...config.messages import refuse, show
 from .outputs import GENERATED_MESH, MESH_OF_FILE
 
@@ -377,14 +377,11 @@ class ShapeGridConfig(Section):
     `/shapes_finite_strain`. Each takes seconds."""
 
 
-SHAPES_KEY = (
-    Named[ShapeConfig] | None,
-    Field(None, title="a section for each shape, by name", description="Bodies of any outline, and their loads."),
+SHAPES_KEY = optional(
+    Named[ShapeConfig], "Bodies of any outline, and their loads.", title="a section for each shape, by name"
 )
-SHAPE_GRIDS_KEY = (
-    Annotated[dict[str, ShapeGridConfig], Field(min_length=1)] | None,
-    Field(None, title="a section for each grid, by name", description="Grids of shapes: group `/shapes`."),
-)
+GRIDS = Annotated[dict[str, ShapeGridConfig], Field(min_length=1)]
+SHAPE_GRIDS_KEY = optional(GRIDS, "Grids of shapes: group `/shapes`.", title="a section for each grid, by name")
 """Types and fields of the sections ``shapes`` and ``shape_grids`` of a study."""
 
 

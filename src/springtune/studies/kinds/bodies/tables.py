@@ -46,14 +46,11 @@ def last_swept(present, along=""):
         together = int(counts.max()) == 1 and int((there.any(names).sum(along)).max()) > 1
         kept += [along] if together else []
         there = there if together else (counts > 0) & (counts == counts.max(names))
-    there = there.transpose(*kept, *names)
     # What is shown rather than others comes last.
     ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
-    there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
-    flat = there.values.reshape(*there.shape[: len(kept)], -1)
-    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), there.shape[len(kept) :])
-    coordinates = {name: there[name].values for name in kept}
-    return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
+    there = there.isel({name: np.argsort(rank, kind="stable")[::-1] for name, rank in ranks.items()})
+    places, coordinates = there.transpose(*kept, *names).argmax(names), {name: there[name].values for name in kept}
+    return {name: xr.DataArray(there[name].values[places[name]], coordinates, kept) for name in names}
 
 
 def at(data, values):
