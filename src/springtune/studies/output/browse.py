@@ -76,8 +76,7 @@ class View:
 def views() -> dict[str, View]:
     """Views that the study kinds declare, by group."""
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the first takes a sixth of the time, where it was built
-    texts = [path.read_text(encoding="utf-8") for path in kind_files(VIEWS)]
-    declared = [one for text in texts for one in yaml.load(text, loader)]
+    declared = [one for path in kind_files(VIEWS) for one in yaml.load(path.read_text(encoding="utf-8"), loader)]
     return {one["group"]: View(**one | {"plots": tuple(Plot(**plot) for plot in one["plots"])}) for one in declared}
 
 
