@@ -218,44 +218,32 @@ class Contact:
         sides = [_Sides(body) for body in self.all]
         for owner in range(len(self.all)):
             if self.floor and owner < len(self.bodies):
-                parts.append(self._floor_contacts(owner, sides[owner]))
+                parts.append(_contacts(owner, -1, *self._near_floor(owner, sides[owner])))
             for target in range(len(self.all)):
                 if target != owner and min(owner, target) < len(self.bodies):
-                    parts.append(self._contacts_between(owner, sides[owner], target, sides[target]))
+                    near = self._near_edges(owner, sides[owner], target, sides[target])
+                    parts.append(_contacts(owner, target, *near))
         return Contacts(*map(np.concatenate, zip(*parts)))
 
-    def _floor_contacts(self, owner: int, sides: _Sides) -> Contacts:
-        """Corners of a body near the floor."""
+    def _near_floor(self, owner: int, sides: _Sides) -> tuple[np.ndarray, ...]:
+        """Corners of a body near the floor, and edges, shares, normals and gaps as in `Contacts`."""
         places = self.all[owner].points[sides.corners]
         near = places[:, 1] <= REACH_SIZES * self.size
         count = int(near.sum())
-        return Contacts(
-            owners=np.full(count, owner),
-            corners=sides.corners[near],
-            targets=np.full(count, -1),
-            edges=np.zeros((count, 2), int),
-            shares=np.zeros(count),
-            normals=np.tile([0.0, 1.0], (count, 1)),
-            gaps=places[near, 1],
-        )
+        edges, shares, normals = np.zeros((count, 2), int), np.zeros(count), np.tile([0.0, 1.0], (count, 1))
+        return sides.corners[near], edges, shares, normals, places[near, 1]
 
-    def _contacts_between(self, owner: int, own: _Sides, target: int, met: _Sides) -> Contacts:
-        """Corners of one body near edges of another one."""
+    def _near_edges(self, owner: int, own: _Sides, target: int, met: _Sides) -> tuple[np.ndarray, ...]:
+        """Corners of one body near edges of another one, these edges, shares, normals and gaps."""
         places, (after, before) = self.all[owner].points[own.corners], self.all[target].neighbours
         rows, edge = self._facing_edges(places, own, met, before)
         ahead, behind = met.turn[edge] < -STRAIGHT_SINE, met.turn[before[edge]] < -STRAIGHT_SINE
         rows = np.concatenate([rows, rows[ahead], rows[behind]])
         edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
-        offset = places[rows] - met.start[edge]
-        return Contacts(
-            owners=np.full(len(rows), owner),
-            corners=own.corners[rows],
-            targets=np.full(len(rows), target),
-            edges=self.all[target].outline[edge],
-            shares=np.einsum("na,na->n", offset, met.along[edge]) / met.length[edge],
-            normals=met.normals[edge],
-            gaps=np.einsum("na,na->n", offset, met.normals[edge]),
-        )
+        offset, normals = places[rows] - met.start[edge], met.normals[edge]
+        shares = np.einsum("na,na->n", offset, met.along[edge]) / met.length[edge]
+        gaps = np.einsum("na,na->n", offset, normals)
+        return own.corners[rows], self.all[target].outline[edge], shares, normals, gaps
 
     def _facing_edges(
         self, places: np.ndarray, own: _Sides, met: _Sides, before: np.ndarray
@@ -482,6 +470,11 @@ class Contact:
         outer = (contacts.owners < bodies) & ((contacts.targets < 0) | (contacts.targets >= bodies))
         inner = (contacts.owners >= bodies) & (contacts.targets >= 0)
         return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
+
+
+def _contacts(owner: int, target: int, corners: np.ndarray, *others: np.ndarray) -> Contacts:
+    """Contacts of the corners of one body with another one."""
+    return Contacts(np.full(len(corners), owner), corners, np.full(len(corners), target), *others)
 
 
 def _near(others: np.ndarray, places: np.ndarray, reach: np.ndarray | float) -> np.ndarray:

@@ -129,6 +129,8 @@ class Stepper(ABC):
 class _ExplicitSteps(Stepper):
     """Explicit steps: compiled for springs with their length law or linear networks, else in numpy."""
 
+    _states = 1, 1  # of displacements, and of velocities, between which steps alternate
+
     def __init__(self, motion: Moving, integrator: str, step: float, precision: str, threads: int) -> None:
         self.motion, self.step = motion, step
         self.half = integrator != "symplectic-euler"
@@ -150,8 +152,7 @@ class _ExplicitSteps(Stepper):
         elif network.energies:
             if threads > 1:
                 raise ValueError(f"threads: {threads}, and a network with energies moves in one; give 1")
-            self._states = 1, 1
-            self._keep, self._gain = self._numbers[0], np.asarray(gain, dtype=self.kind)
+            self._gain = np.asarray(gain, dtype=self.kind)
         else:
             self._of_springs(gain, threads)
 
@@ -179,7 +180,6 @@ class _ExplicitSteps(Stepper):
         self.function = advance_springs
         self._threads = [((*arrays, np.empty((4, most), dtype=self.kind)), sizes) for _ in range(threads)]
         self._as, self._back = lambda values: values[order], lambda values: values[place]
-        self._states = 1, 1
 
     def _of_matrix(self, matrix: csc_array, gain: np.ndarray, threads: int) -> None:
         """Prepare steps of a linear network; the matrix is symmetric, so its columns are its rows."""
@@ -280,12 +280,12 @@ class _ExplicitSteps(Stepper):
 
     def _advance_energies(self, steps: int) -> None:
         """Advance a network with energies, which are not compiled."""
-        motion, step, u, v = self.motion, self._numbers[1], self._u[0], self._v[0]
+        motion, (keep, step), u, v = self.motion, self._numbers, self._u[0], self._v[0]
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(steps):
                 at, speed = u.astype(float), v.astype(float)
                 missing = motion.missing(at) - motion.damper_forces(at, speed)
-                v *= self._keep
+                v *= keep
                 v += self._gain * motion.network.expand(missing)
                 u += step * v
 
