@@ -89,12 +89,12 @@ def _allow_text(*texts: str) -> Any:
 def or_text(texts: Mapping[str, dict[str, str]], refusal: str) -> Any:
     """Validator of a section that may also be one of some texts, each with the keys that it stands for."""
 
-    def read(cls: type, value: object) -> object:
+    def read(value: object) -> object:
         if isinstance(value, str) and value not in texts:
             raise refuse(f"{show(value)} is {refusal}")
         return texts[value] if isinstance(value, str) else value
 
-    return model_validator(mode="before")(classmethod(read))
+    return model_validator(mode="before")(read)
 
 
 class SegmentConfig(Section):
