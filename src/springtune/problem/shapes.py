@@ -439,8 +439,7 @@ class Quantity:
         what = f"quantity {self.name!r}"
         if components := choose(COMPONENTS, self.kind, f"{what}, kind"):
             _check_name(self.of, f"{what}, of")
-            if self.component not in components:
-                raise ValueError(f"{what}: component {self.component!r}; give one of {', '.join(components)}")
+            choose(dict.fromkeys(components), self.component, f"{what}, component")
         elif self.of or self.component:
             raise ValueError(f"{what}: {self.kind} is of the entire body; leave 'of' and 'component' out")
         if self.expected is not None:

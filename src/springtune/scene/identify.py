@@ -17,7 +17,7 @@ from scipy.stats import f, t
 
 from ..mesh.sheets import parts_of
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, TestDataError, rotated
-from ..problem.quantities import Number, choose, nearest, positive
+from ..problem.quantities import Number, choose, positive
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
@@ -358,8 +358,7 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str,
     """Constants of a usual material, with those that are known, and the names of the others."""
     constants = {name: USUAL_POISSON_RATIOS.get(name, 1e9) for name in names}
     for name, value in known.items():
-        if name not in names:
-            raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
+        choose(constants, name, "known")
         is_ratio = name in USUAL_POISSON_RATIOS
         if is_ratio and not -1 < number_of(value) <= 0.5:
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
