@@ -90,7 +90,8 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in PAGE_SCRIPTS) + "})();\n"
     # Scripts run only with one of these hashes, and nothing may be loaded: a script in a title stays a text.
-    hashes = " ".join(_hash(text) for text in (script, *library.values()))
+    digests = (hashlib.sha256(text.encode()).digest() for text in (script, *library.values()))
+    hashes = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
     loader = jinja2.PackageLoader("springtune.studies.output", "assets")
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
@@ -122,10 +123,6 @@ def _library() -> dict[str, str]:
         raise FileNotFoundError("the package bokeh is not installed; `pip install bokeh` or `make study` installs it")
     folder = Path(found.origin).parent / "server/static/js"
     return {name: (folder / f"{name}.min.js").read_text(encoding="utf-8") for name in BOKEH_SCRIPTS}
-
-
-def _hash(script: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
 # -- packed numbers ----------------------------------------------------------------------------------------------------

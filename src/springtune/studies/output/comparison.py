@@ -166,8 +166,7 @@ def _rounded(data: xr.Dataset) -> xr.Dataset:
 
 def _names_of_one(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
     """Names that only one side has, for each side."""
-    one, other = sides
-    return [name for name in one if name not in other], [name for name in other if name not in one]
+    return tuple([name for name in one if name not in other] for one, other in (sides, sides[::-1]))
 
 
 def _compare_group(

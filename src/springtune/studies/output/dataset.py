@@ -207,11 +207,8 @@ def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashabl
 
 def _chunk_shape(shape: Sequence[int], cells: int) -> tuple[int, ...]:
     """Chunk shape of so many cells: whole last dimensions, then as many of the others as fit."""
-    chunk: list[int] = []
-    for length in reversed(shape):
-        chunk.insert(0, max(1, min(length, cells)))
-        cells //= chunk[0]
-    return tuple(chunk)
+    cells_of_one = np.cumprod((1, *shape[:0:-1]))[::-1]  # along each dimension
+    return tuple(np.clip(cells // cells_of_one, 1, shape).tolist())
 
 
 LARGE_ARRAY_BYTES = 2**20  # larger arrays, in bytes, are read on demand

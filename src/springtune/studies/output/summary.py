@@ -152,7 +152,6 @@ def _lines_on_references(root: "xr.Dataset", called: str) -> Iterator[str]:
         if not scenes.any():
             continue
         few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
-        few = few.transpose(*root.reference_message.dims)
         cells = _cells(root, few, "reference_message")
         yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_cell_lines(cells))
 
