@@ -93,7 +93,7 @@ use rule mesh as sample with:
         RESULTS / "done/{stage,sample}_{bundle}.json",
 
 
-# Other jobs would be in the seconds of these two. On a cluster a node of its own is for the profile to ask for.
+# These two measure seconds, so nothing runs beside them. On a cluster the profile must ask for a whole node.
 use rule mesh as benchmark with:
     output:
         RESULTS / "done/{stage,benchmark}_{bundle}.json",

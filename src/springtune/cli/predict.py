@@ -220,7 +220,7 @@ def _refuse(why: str) -> "SpringNet":
 )
 @options.sheet_options("A mesh type, or a mesh file.", "for masses, and the largest stable time steps", "structured")
 @click.option("--definition", default="patch", show_default=True, help="Rule for the stiffness, see `definitions`.")
-@click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
+@click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that need one.")
 @click.option("--load", help="What holds and pulls the beam, nothing without; or a shape, its only load without.")
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")

@@ -1,1 +1,1 @@
-"""Engines: programs that others run springs in, and the textbook solvers behind them; one module each."""
+"""Simulators that run springs (Newton, MuJoCo), and textbook solvers (XPBD, VBD); one module each."""

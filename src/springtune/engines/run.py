@@ -197,10 +197,10 @@ class EngineResult(Tabled, Ended):
 
     def _computed_rows(self) -> Iterator[tuple[str, str]]:
         yield "error", off_text(self.error, self.reference)
-        yield "of it definition", error_text(self.definition_error)
+        yield "from the definition", error_text(self.definition_error)
         if self.by_law != self.exact:
-            yield "of it law", error_text(self.law_error)
-        yield "of it solver", off_text(self.solver_error, self.reference)
+            yield "from the law", error_text(self.law_error)
+        yield "from the solver", off_text(self.solver_error, self.reference)
         yield "drift across", self._drift_text
 
     @property

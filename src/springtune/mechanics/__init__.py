@@ -1,4 +1,4 @@
-"""Time integrators: their names, options and numerical behaviour."""
+"""Mechanics of spring networks: energies, equilibria, contact, motion; here the names of time integrators."""
 
 from dataclasses import dataclass
 

@@ -1,1 +1,1 @@
-"""Scenes: the one recipe from a mesh to an answer, and what is read from it."""
+"""Scenes: a body with a mesh, material, load and definition, solved as a network and compared with its reference."""

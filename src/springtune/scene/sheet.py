@@ -141,7 +141,7 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     is_a(material, AnyMaterial, "material")
     definition = definition_of(definition)
     if definition.needs == "stiffness":
-        raise DefinitionError(f"definition {definition.name!r} is told its stiffness; choose one such as 'uniform'")
+        raise DefinitionError(f"definition {definition.name!r} needs a given stiffness; choose one such as 'uniform'")
     with naming_errors(definition):
         return MeshModuli(mesh)(material, definition)
 

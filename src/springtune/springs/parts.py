@@ -35,7 +35,7 @@ def derive_by_parts(
     if len(groups) == 1:
         return definition.springs(mesh, next(iter(groups)), thickness, given)
     if definition.needs or definition.uniaxial:
-        why = "is told stiffness" if definition.needs == "stiffness" else "is told what the whole body does"
+        why = "needs a given stiffness" if definition.needs == "stiffness" else "needs the response of the whole body"
         why = "is for sheets of one stress" if definition.uniaxial else why
         remedy = "choose one that derives each part's springs, such as 'van-gelder', 'area' or 'delingette'"
         raise DefinitionError(f"{why} and the body has {len(groups)} materials; {remedy}")

@@ -1,4 +1,4 @@
-"""Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
+"""Stored results: one HDF5 file per mesh and stage, results by the hash of their inputs.
 
 Scalars and texts are one JSON text, since HDF5 attributes cost more than solving. Arrays that are written together and
 have one shape are rows of a dataset. Checksums and a file's name in it show damaged and exchanged files.

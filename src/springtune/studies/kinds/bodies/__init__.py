@@ -1,5 +1,5 @@
 """Beams of the grids and shapes: meshes, references, networks and sensitivity curves.
 
-`plan` makes the tasks and declares the stages, each done by the module of its name; `stored` reads what they store, and
-`collect` makes rows for the groups that `variables` declares.
+`kind` makes the tasks and declares the stages, each done by the module of its name; `stored` reads what they store, and
+`collect` makes rows for the groups that `collect.csv` declares.
 """

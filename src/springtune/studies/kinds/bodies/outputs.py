@@ -1,4 +1,4 @@
-"""Outputs of beams and shapes, and their views on the page to browse."""
+"""Outputs of beams and shapes: their figures and tables."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Tables of beams and shapes: a row a network."""
+"""Tables of beams and shapes: one row per network."""
 
 import numpy as np
 import pandas as pd
