@@ -83,7 +83,7 @@ def test_newton(solver):
     names = NAMES | ({"E": 0.0} if springs else {"springs": [], "k": []})
     code = BOXES["Newton"]
     if solver == "SemiImplicit":  # as the comment says
-        code = code.replace("tri_ka=lam * h", "tri_ka=(lam + G) * h").replace(
+        code = code.replace("tri_ka=lam * t", "tri_ka=(lam + G) * t").replace(
             "SolverVBD(model, iterations=20)", "SolverSemiImplicit(model)"
         )
     exec(code.replace("SolverVBD", f"Solver{solver}"), names)

@@ -45,7 +45,7 @@ EXCLUDED_OPTIONS = {
 }
 """Options that another one replaces."""
 
-REQUIRED_OPTIONS = {"scale": ("study", "engine"), "force": ("load", "engine")} | dict.fromkeys(
+REQUIRED_OPTIONS = {"scale": ("study", "engine"), "force": ("engine", "load")} | dict.fromkeys(
     ("dt", "substeps", "iterations", "precision", "definition"), ("engine",)
 )
 """Options that need others, if a command has these."""
@@ -70,10 +70,10 @@ def check_option_pairs() -> None:
 MISSING = {
     "beam": f"beam: missing; give one such as 200x40, or --study such as {STUDY_EXAMPLE}",
     "size": "size: missing; give the length of an edge such as '2 mm'",
-    "material": f"material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson",
+    "material": f"material: missing; give one of {', '.join(MATERIALS)}, or --young and --poisson",
     "density": "density: missing; give one such as '1000 kg/m^3'",
-    "load": "load: missing; give one to calibrate to such as traction",
-    "force": "force: none; give the size of the force on the beam such as '0.2 N'",
+    "load": "load: missing; give the load to calibrate to, such as traction",
+    "force": "force: missing; give the size of the force on the beam such as '0.2 N'",
 }
 """Messages about missing options of a beam."""
 

@@ -77,7 +77,7 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
     "[default: structured; with --error all]",
     "for the largest stable time steps",
 )
-@click.option("--error", help="Find the coarsest mesh that keeps this error, such as '1 %'.")
+@click.option("--error", help="Find the coarsest mesh that stays within this error, such as '1 %'.")
 @click.option(
     "--load",
     help="Load case of a shape, by default its only one. Of a beam the loads that count: some of traction, "
@@ -94,10 +94,10 @@ def predict(
 
     The network of each definition is solved on the mesh, with linear kinematics, and compared with the converged
     reference of small strain. With --error, meshes are solved from coarse to fine, until a mesh and all finer ones
-    tried, up to twice as fine, keep this error. Errors of a shape are those of the quantities of its load case.
+    tried, up to twice as fine, stay within this error. Errors of a shape are those of the quantities of its load case.
 
     With --engine, find the factor on the stiffness that an engine needs at a setting, the errors under other loads, and
-    the settings that converge.
+    the settings that converge. Stiff materials can take many minutes.
     """
     from ..prediction.choices import USUAL_LOADS
     from .recommendation import written_text

@@ -41,7 +41,7 @@ which stiffness no longer decides."""
 
 TRIED_ORDERS = 4  # orders of particles, springs and cells that a calibration is tried in
 
-DAMPING_NOTE = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
+DAMPING_NOTE = "critical for the loaded mode: each step divides velocities by 1 + damping times the step"
 """Note on the damping of a run."""
 
 RUN_TOLERANCES = {"float64": 1e-4, "float32": 1e-3}
@@ -243,7 +243,7 @@ class EngineFit(Tabled):
             yield "in other orders", _between(self.spread, self.result.reference)
         yield "drift across", self.result._drift_text
         yield "without a factor", self.untuned._parts
-        yield "run", f"{self.result.status} after {self.result.frames} frames"
+        yield "run", f"{self.result.status}, frames: {self.result.frames}"
         yield "damping", f"{self.result.damping:.4g} 1/s, {DAMPING_NOTE}"
         yield "set besides", ENGINES[self.result.engine].besides
         yield "a frame", frame_text(self.result.frame_seconds)

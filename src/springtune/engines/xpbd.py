@@ -1,9 +1,9 @@
 """Extended position-based dynamics: Macklin, Mueller and Chentanez, XPBD, Motion in Games 2016.
 
 A spring is the constraint ``C = l - L``. An iteration visits one constraint after the other; each changes its
-multiplier, zero as a step begins, by ``(-C - a lambda) / (sum of w |grad C|^2 + a)`` with ``a = 1 / (k h^2)``. Few
-iterations of small steps are better than many of large ones (Macklin et al., Small steps in physics simulation, SCA
-2019). The method follows later descriptions; these two papers were not read.
+multiplier, zero as a step begins, by ``(-C - a lambda) / (sum of w |grad C|^2 + a)`` with ``a = 1 / (k h^2)``, inverse
+masses w and the step h. Few iterations of small steps are better than many of large ones (Macklin et al., Small steps
+in physics simulation, SCA 2019). The method follows later descriptions; these two papers were not read.
 
 Areas, squared lengths and rubber are blocks of constraints, see `springtune.handover.xpbd`.
 """
@@ -20,7 +20,7 @@ from .base import EngineError, Parameter, Setting, Textbook, engine, project_spr
 BLOCK_KINDS = tuple(COMPLIANCE_UNITS)  # kinds of blocks, by their numbers here
 
 LEAST_AREA_RATIO = 0.05
-"""Area over the one at rest below which a triangle of rubber is taken for one that has it: steps may turn it over."""
+"""Least area over that at rest; smaller or inverted triangles of rubber count as having it."""
 
 
 @compiled

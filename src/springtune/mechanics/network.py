@@ -33,7 +33,7 @@ NO_CHOLESKY_FROM_UNKNOWNS = 600_000
 """Unknowns above which multigrid also replaces Cholesky: faster there, with half the memory."""
 
 MOST_CHOLESKY_UNKNOWNS = 2_500_000
-"""Unknowns up to which Cholesky (2 kB an unknown) replaces multigrid that does not converge; SuperLU: to fewer."""
+"""Most unknowns for which Cholesky (2 kB each) replaces multigrid that does not converge; SuperLU: the number above."""
 
 PINS_FROM_UNKNOWNS = 5_000
 """Unknowns above which an indefinite matrix gets a `PinnedFactor`; SuperLU is as fast on smaller ones."""
@@ -127,11 +127,11 @@ class Network:
     # -- mechanics --------------------------------------------------------------------------------------------------
 
     def free_forces_over_k(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
-        """Return the force against displacements over k [m], shape (unknowns,); `linear`: in linear kinematics."""
+        """Return the internal forces over k [m], shape (unknowns,); `linear`: in linear kinematics."""
         return self.reduce((self.linear_forces_over_k if linear else self.forces_over_k)(displacements))
 
     def forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
-        """Return the force against displacements at all particles over k [m], shape (n_points, 2)."""
+        """Return the internal forces at all particles over k [m], shape (n_points, 2)."""
         total = np.zeros(self.held.shape)
         if self.has_springs:
             total -= self._pattern.sum_springs(self._end_forces(displacements))
@@ -162,7 +162,7 @@ class Network:
         return self.stiffness * squares / (lengths + self.rest_lengths)
 
     def rounding(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
-        """Return the size of the rounding errors in the resistance [m], (unknowns,): only sums at particles round."""
+        """Return the size of the rounding errors in internal forces [m], (unknowns,): only sums at particles round."""
         total = np.zeros(self.held.shape)
         if linear:
             normals = self.rest_vectors / self.rest_lengths[:, None]
@@ -202,7 +202,7 @@ class Network:
     def tangent(
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> csc_array:
-        """Return the derivative of the resistance [1], (unknowns, unknowns), symmetric except for a follower's part."""
+        """Derivative of internal forces [1], (unknowns, unknowns), symmetric except for a follower's part."""
         data = self._pattern.coupling_entries(self._couplings(displacements))
         if follower is not None:
             s, load = follower

@@ -39,7 +39,7 @@ SEARCHED_PARTICLES, SOLVED_PARTICLES = 20_000, 100_000
 """Particles up to which meshes are searched, in some six seconds each; up to which one is solved, in a minute."""
 
 
-ROUNDING_ERROR = 1e-9  # largest error by rounding [1]; references of closed form have a smaller estimate
+ROUNDING_ERROR = 1e-5  # errors that differ by less are equal [1]; references of closed form have a smaller estimate
 
 _T = TypeVar("_T")
 

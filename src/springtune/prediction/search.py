@@ -32,7 +32,7 @@ FINEST_CELLS_RATIO, LEAST_FINER_MESHES = 2.0, 2
 ROW_HEIGHT = math.sqrt(3) / 2  # height of an equilateral triangle, over its side
 
 EXTRAPOLATION_MARGIN = 1.5
-"""Allowed rest of an error's way to its limit, over the rest of an error in proportion to the mesh size."""
+"""Change still allowed to an error down to the finest mesh, over that of an error in proportion to the mesh size."""
 
 
 EVERY_CELL_COUNT_UP_TO, STEPS_A_DOUBLING = 16, 4

@@ -421,7 +421,7 @@ class Level:
         return total
 
     def _shares(self, group: str) -> np.ndarray:
-        """Integral of the functions over a group, by its length."""
+        """Integral of the functions over a group, divided by its length."""
         whole = self.integral(group, lambda points, _: np.ones_like(points))[:, 0]
         return whole / whole[: len(self.space.mesh.points)].sum()
 

@@ -30,7 +30,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 @definition("patch-area", order=200, cost=1)
 def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh.
+    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: its mean E is exact, nu is not.
 
     Source: own rule (derived).
     """
@@ -40,7 +40,7 @@ def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
 def _scaled(found: Springs, mesh: Mesh, material: Material, thickness: float) -> Springs:
     from ..mechanics.continuum import PatchTest  # here: see `springtune.springs`
 
-    # The modulus in units of the reference stiffness: the scalar is a ratio of the two.
+    # `stiffness` is the modulus times thickness over the reference stiffness.
     stiffness, _ = PatchTest(mesh).axial(found)
     scalar = material.young_modulus * thickness / (stiffness * found.reference)
     return replace(found, reference=scalar * found.reference, evaluations=1)

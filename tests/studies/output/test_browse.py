@@ -136,11 +136,11 @@ class TestOverview:
             self.solved("patch", 1e-3, 1.78e8, 8.9e7),
             # A coarser mesh, and energies without a spring, have smaller errors.
             self.solved("patch", 0.0, 1.6e8, 8e7, mesh_size=5e-3),
-            self.solved("neo-hooke", 1e-5, 0.0, 0.0),
+            self.solved("neo-hooke", 1e-5, 0.0, 0.0), self.solved("delingette", 1e-4, 1.8e8, 9e7, further_energies=1),
         ])  # fmt: skip
         answer = (
             "For 100x20, free 1 mm, steel: patch 1.78e8 N/m inside (0.89 E t), 8.9e7 N/m on the outline, "
-            "error +0.10 %; best uniform stiffness 1.7e8 N/m (paper), error −20 %."
+            "error +0.10 %; best uniform stiffness 1.7e8 N/m (paper), error −20 %; with energies besides springs del"
         )
         assert said.startswith(answer)
         assert "patch, linear 0.05 %; +0.10 %" in said and "paper, linear 20 %; −20 %" in said

@@ -48,6 +48,7 @@ class Answer(NamedTuple):
     mesh_size: float
     definition: str
     uniform: bool
+    energies: bool  # besides springs
     inside: np.ndarray
     outline: np.ndarray
     ratio: float  # median inside over E t
@@ -60,7 +61,7 @@ class Answer(NamedTuple):
 
 
 def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "material")) -> Iterator[tuple[Answer, ...]]:
-    """The best definition and the best uniform stiffness, where known, on the finest mesh of each type and material."""
+    """The best springs alone, uniform stiffness, and springs with energies on the finest mesh of each."""
     if "stiffness_inside" not in cells:
         return
     membrane = cells.get("material_young_modulus", np.nan) * cells.get("beam_thickness", np.nan)
@@ -72,9 +73,12 @@ def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "mater
         for name, own in here[here.mesh_size == size].groupby("definition"):
             inside, outline = (np.unique(own[f"stiffness_{place}"].dropna()) for place in ("inside", "outline"))
             uniform = "stiffness" in own and own.stiffness.notna().any()
+            energies = "further_energies" in own and bool(own.further_energies.max() > 0)
+            kind, ratio = (uniform, energies), own.ratio.median()
             if len(errors := own.valid_error[own.known].to_numpy()):
-                answers.append(Answer(labels, size, name, uniform, inside, outline, own.ratio.median(), errors))
-        kinds = ([one for one in answers if one.uniform == alike] for alike in (False, True))
+                answers.append(Answer(labels, size, name, *kind, inside, outline, ratio, errors))
+        order = (False, False), (True, False), (False, True)
+        kinds = ([one for one in answers if (one.uniform, one.energies) == kind] for kind in order)
         if answers:
             yield tuple(min(kind, key=lambda one: one.median_error) for kind in kinds if kind)
 

@@ -88,6 +88,7 @@ def _solve_problem(about, springs, seconds, task):
     result = {"seconds": time.perf_counter() - begin, "definition_seconds": seconds}
     result |= {name: getattr(found, name) for name in ("status", "message", "negative_pivots")}
     result |= {f"stiffness_{part}": value for part, value in about.sheet.typical_stiffness(springs).items()}
+    result["further_energies"] = len(springs.energies)
     if task.get("keep_fields") and found.equilibrium.converged:
         moved = found.equilibrium.displacements
         forces = found.problem.network.spring_forces_over_k(moved, task["kinematics"] == "linear")
