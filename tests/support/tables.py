@@ -34,7 +34,7 @@ def refused_files(name):
 @cache
 def beside(file):
     """What `cases.yaml` has in the folder of a file of tests."""
-    return yaml.safe_load(Path(file).with_name("cases.yaml").read_text())
+    return yaml.load(Path(file).with_name("cases.yaml").read_text(), yaml.CSafeLoader)
 
 
 def cases(test):

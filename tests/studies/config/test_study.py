@@ -300,7 +300,7 @@ class TestPressureAndLaying:
 HERE = Path(__file__).parent
 REFUSED = {
     f"{study}: {name}": (study, *case)
-    for study, cases in yaml.safe_load((HERE / "refused_studies.yaml").read_text()).items()
+    for study, cases in yaml.load((HERE / "refused_studies.yaml").read_text(), yaml.CSafeLoader).items()
     for name, case in cases.items()
 }
 
