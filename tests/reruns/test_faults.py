@@ -16,7 +16,7 @@ from campaigns import Campaign
 from tables import STUDIES
 
 FOLDER = Path("results/survival")
-KILLS = (1, 2, 3, 5, 8)
+KILLS = (1, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 3, 5)), 8)
 """Renamings of a finished file at which the run is killed."""
 
 
@@ -87,7 +87,7 @@ def test_a_killed_run_goes_on(whole, started, monkeypatch, number):
     good(whole)
 
 
-@pytest.mark.parametrize("size", [500, 3000, 20_000, 60_000])
+@pytest.mark.parametrize("size", [500, pytest.param(3000, marks=pytest.mark.slow), 20_000, 60_000])
 def test_a_full_disk_ends_the_run_and_spoils_nothing(whole, started, size):
     def limited():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
