@@ -1,6 +1,7 @@
 """Run time against error: names of the approaches of the benchmark."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from itertools import product
 
 from springtune.mesh.cells import MESH_TYPES
 from springtune.springs.base import DEFINITIONS
@@ -22,13 +23,8 @@ PARTS = ("meshing", "assembling", "factorizing", "solving")  # timed parts of a 
 THREAD_COUNTS = (1, 2)  # numbers of threads of the benchmark's explicit steps
 
 
-def approach_names(definitions: Iterable[str], mesh_types: Sequence[str], others: Iterable[str]) -> tuple[str, ...]:
+def approach_names(definitions: Iterable[str], mesh_types: Iterable[str], others: Iterable[str]) -> tuple[str, ...]:
     """Return the names of approaches: ``definition/mesh type`` for pairs that fit, and others."""
-    names = []
-    for name in definitions:
-        for mesh_type in mesh_types:
-            made, definition = MESH_TYPES.get(mesh_type), DEFINITIONS[name]
-            # The model of the study refuses unknown mesh types.
-            if not definition.needs and (made is None or made.corners in definition.cells):
-                names.append(f"{name}/{mesh_type}")
-    return (*names, *others)
+    able = (name for name in definitions if not DEFINITIONS[name].needs)
+    pairs = (pair for pair in product(able, mesh_types) if MESH_TYPES[pair[1]].corners in DEFINITIONS[pair[0]].cells)
+    return (*map("/".join, pairs), *others)

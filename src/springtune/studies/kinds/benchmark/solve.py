@@ -2,7 +2,7 @@
 
 import time
 import traceback
-from collections import defaultdict
+from collections import Counter, defaultdict
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -76,23 +76,15 @@ class LoadedBeam:
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
 
 
-class Clock:
+class Clock(Counter):
     """Seconds of each part of a run."""
-
-    def __init__(self):
-        self.seconds = dict.fromkeys(PARTS, 0.0)
-
-    @property
-    def total(self):
-        """Seconds of all parts."""
-        return sum(self.seconds.values())
 
     @contextmanager
     def __call__(self, part):
         """Add the seconds of this context to a part."""
         begin = time.perf_counter()
         yield
-        self.seconds[part] += time.perf_counter() - begin
+        self[part] += time.perf_counter() - begin
 
 
 def measure(scene, cases, most_seconds):
@@ -116,7 +108,7 @@ def measure(scene, cases, most_seconds):
     about = {
         "reference_displacement": reference.displacement,
         "reference_error_estimate": reference.error_estimate,
-        "reference_seconds": clock.seconds["solving"],
+        "reference_seconds": clock["solving"],
     }
     return [about, *chain.from_iterable(rows.values())]
 
@@ -133,7 +125,7 @@ def _measure_case(scene, approach, size):
     run, clocks = partial(network, definition=definition, mesh_type=mesh_type), []
     run = run if mesh_type else APPROACHES[approach]
     try:
-        while len(clocks) <= REPETITIONS and not (clocks and clocks[0].total > LONG_CASE_SECONDS):
+        while len(clocks) <= REPETITIONS and not (clocks and clocks[0].total() > LONG_CASE_SECONDS):
             clocks.append(Clock())
             displacement, unknowns = run(scene, size, clocks[-1])
     except DefinitionError as error:
@@ -148,8 +140,8 @@ def _measure_case(scene, approach, size):
         return _failed_case(why, Status.NOT_CONVERGED)
     warm = clocks[1:] or clocks
     found = {"displacement": displacement, "unknowns": unknowns, "status": int(Status.SOLVED), "message": ""}
-    found |= {f"{part}_seconds": np.median([clock.seconds[part] for clock in warm]) for part in PARTS}
-    return found | {"seconds": np.median([clock.total for clock in warm])}
+    found |= {f"{part}_seconds": np.median([clock[part] for clock in warm]) for part in PARTS}
+    return found | {"seconds": np.median([clock.total() for clock in warm])}
 
 
 def explicit(scene, sizes, updates=EXPLICIT_UPDATES):
@@ -170,7 +162,7 @@ def explicit(scene, sizes, updates=EXPLICIT_UPDATES):
                 for clock in clocks:
                     with clock("solving"):
                         stepper.advance(steps)
-            seconds = np.median([clock.total for clock in clocks])
+            seconds = np.median([clock.total() for clock in clocks])
             labels = {"mesh_size": size, "thread_count": threads, "precision": precision}
             yield labels | {"spring_updates": steps * len(mesh.edges) / seconds}
 
@@ -183,7 +175,7 @@ def explicit(scene, sizes, updates=EXPLICIT_UPDATES):
 def network(scene, size, clock, definition, mesh_type):
     """Solve the linear network of a definition; definitions share a mesh, whose time counts for each."""
     mesh, seconds = _timed_mesh(mesh_type, scene.beam, size)
-    clock.seconds["meshing"] += seconds
+    clock["meshing"] += seconds
     with clock("assembling"):
         cache, springs, problem = _problem(scene, mesh, definition)
         problem.network.tangent()

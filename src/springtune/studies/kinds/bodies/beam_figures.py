@@ -14,16 +14,7 @@ from springtune.springs.lattice import COEFFICIENT
 from ...config.model import distinct
 from ...output import style
 from ...output.answers import plane_vectors, status_words
-from ...output.dataset import (
-    SHOWN_PREFIX,
-    cells,
-    choose,
-    group,
-    in_own_plane,
-    labels_of,
-    own_laws,
-    sign_of_errors,
-)
+from ...output.dataset import SHOWN_PREFIX, cells, choose, group, in_own_plane, labels_of, own_laws, sign_of_errors
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .shape_figures import draw_network, extent, magnification
 from .tables import at, labelled_beam, last_swept, own_references

@@ -315,12 +315,9 @@ def _face_reference_rows(study, folder, kinds):
             if "x" in result:
                 result |= {"positions": result["x"] / one.beam.length, "profile": result["displacements"][:, -1, 1]}
         row = study.labels(one) | {"reference": kind, "reference_message": result["message"]}
-        if "displacement" in result:
-            row |= {
-                "reference_face_displacement": scale * result["displacement"],
-                "reference_face_mean_displacement": scale * result["mean_displacement"],
-                "reference_error_estimate": result["error_estimate"],
-            }
+        means = ("displacement", "mean_displacement") if "displacement" in result else ()
+        row |= {f"reference_face_{name}": scale * result[name] for name in means}
+        row["reference_error_estimate"] = result.get("error_estimate")
         if "profile" in result:  # one that is interpolated has none
             profile = CubicSpline(result["positions"], result["profile"])
             row["reference_face_profile"] = scale * profile(FACE_POSITIONS)

@@ -559,5 +559,4 @@ def summary(study: Study, further: list[list[object]]) -> str:
         sizes = len(scenes), len(scenes - seen), len({scene.mesh for scene in scenes}), len(forces), len(grid.curves)
         grids.append([grid.name, *sizes])
         seen |= scenes
-    texts = aligned(rows, left=0, right=(1,)), aligned(grids, left=0, right=(1, 2, 3, 4, 5))
-    return "\n\n".join([title, *texts])
+    return "\n\n".join([title, aligned(rows, left=0, right=(1,)), aligned(grids, left=0, right=(1, 2, 3, 4, 5))])

@@ -25,17 +25,10 @@ def prepare(file, content):
 
 def failed(curve, why):
     """Result of a curve that cannot be traced."""
-    count = len(curve["stiffnesses"])
-    return {
-        "displacement": np.full(count, np.nan),
-        "stable": np.zeros(count, dtype=bool),
-        "status": Status.FAILED,
-        "message": why,
-        "best_stiffness": np.nan,
-        "best_status": Status.FAILED,
-        "best_message": why,
-        "seconds": 0.0,
-    }
+    empty = np.full(len(curve["stiffnesses"]), np.nan)
+    found = {"displacement": empty, "stable": empty > 0, "best_stiffness": np.nan, "seconds": 0.0}
+    found |= dict.fromkeys(("status", "best_status"), Status.FAILED)
+    return found | dict.fromkeys(("message", "best_message"), why)
 
 
 def solve(curve, shared):

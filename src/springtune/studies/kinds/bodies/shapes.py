@@ -177,10 +177,7 @@ class PressureConfig(Section):
     follower: fields.Flag = default("false")
     """Whether it follows the sides in nonlinear kinematics."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _alone(cls, value: object) -> object:
-        return {"pressure": value} if isinstance(value, str) else value
+    _alone = model_validator(mode="before")(lambda value: {"pressure": value} if isinstance(value, str) else value)
 
 
 class QuantityConfig(Section):
@@ -302,6 +299,9 @@ def _allow_path(schema: dict[str, Any]) -> None:
     schema["anyOf"] = [{"type": "string", "minLength": 1}, array]
 
 
+Files = Annotated[list[ShapeFileConfig], Field(min_length=1, json_schema_extra=_allow_path), WrapValidator(_files)]
+
+
 class ShapeConfig(Section):
     """A body from an outline or a mesh file, with named groups and points."""
 
@@ -314,10 +314,7 @@ class ShapeConfig(Section):
     holes: list[HoleConfig] = []
     """Holes, and parts of other materials."""
 
-    file: (
-        Annotated[list[ShapeFileConfig], Field(min_length=1, json_schema_extra=_allow_path), WrapValidator(_files)]
-        | None
-    ) = Field(None, title="the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
+    file: Files | None = Field(None, title="the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
     """Mesh file with groups, instead of an outline; or several with their mesh sizes: the reference uses the finest."""
 
     unit: fields.Length = default("1 m")
@@ -472,13 +469,12 @@ def expand(config, declared):
             found.update(own)
             referred.update(_case(one) for one in own if grid.reference)
             finite.update((*_case(one), one.law) for one in own if grid.finite_strain and one.law)
-    known = [*config.shapes], [GENERATED_MESH, MESH_OF_FILE], [*config.materials], [*DEFINITIONS], [*KINEMATICS]
+    shapes, materials, definitions = [*config.shapes], [*config.materials], [*DEFINITIONS]
 
     def order(one):
-        labels = one.shape, one.mesh_type, one.material, one.definition, one.kinematics
-        shape, mesh_type, material, *rest = (names.index(label) for names, label in zip(known, labels))
+        body = shapes.index(one.shape), one.mesh_size, materials.index(one.material)
         load = list(config.shapes[one.shape].loads).index(one.load)
-        return shape, mesh_type, one.mesh_size, material, load, *rest
+        return *body, load, definitions.index(one.definition), KINEMATICS.index(one.kinematics)
 
     scenes = sorted(found, key=order)
     return Shapes(
@@ -492,9 +488,7 @@ def expand(config, declared):
     )
 
 
-def _case(one):
-    return one.shape, one.material, one.load
-
+_case = attrgetter("shape", "material", "load")
 
 MOST_SHAPE_SCENES = 100_000
 
@@ -642,13 +636,12 @@ def _check_grid(config, grid, path, problems):
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")
     shapes = {name: config.shapes[name] for name in grid.shape}
-    weighs = False
+    cases = [(name, load, shape.loads) for name, shape in shapes.items() for load in grid.load or shape.loads]
+    for name, load, loads in cases:
+        if load not in loads:
+            problems.add((*path, "load"), f"shape '{name}' has no load '{load}'; {nearest(load, loads)}")
+    weighs = any(any(loads[load].gravity) for _, load, loads in cases if load in loads)
     for name, shape in shapes.items():
-        for load in grid.load or shape.loads:
-            if load not in shape.loads:
-                problems.add((*path, "load"), f"shape '{name}' has no load '{load}'; {nearest(load, shape.loads)}")
-            elif any(shape.loads[load].gravity):
-                weighs = True
         if shape.file is not None and grid.mesh_size:
             message = f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a grid of its own"
             problems.add((*path, "mesh_size"), message)
@@ -663,7 +656,6 @@ def _check_grid(config, grid, path, problems):
             most = f"{1e3 * min(wide, high):.4g} mm"
             problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
         check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
-    count = sum(len(grid.load or shape.loads) for shape in shapes.values())
-    count *= len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
+    count = len(cases) * len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
     if count > MOST_SHAPE_SCENES:
         problems.add(path, f"{count} scenes; a study has at most {MOST_SHAPE_SCENES} of shapes: {FEWER}")

@@ -114,12 +114,8 @@ def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
-FIELD_ARRAYS = {
-    "displacements": "f8",
-    "reference_displacements": "f8",
-    "spring_stiffnesses": "f4",
-    "spring_forces": "f4",
-}
+FIELD_ARRAYS = dict.fromkeys(("displacements", "reference_displacements"), "f8")
+FIELD_ARRAYS |= dict.fromkeys(("spring_stiffnesses", "spring_forces"), "f4")
 """Types of stored arrays of particles and springs."""
 
 

@@ -1,8 +1,7 @@
 """Scenes in engines: every combination of the values of a study's section ``engines``."""
 
-from dataclasses import dataclass
 from itertools import product
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
@@ -101,8 +100,7 @@ class EnginesConfig(Section):
     """A run ends at this relative distance from rest; by default 1e-7, in single precision 1e-4."""
 
 
-@dataclass(frozen=True)
-class EngineRun:
+class EngineRun(NamedTuple):
     """A run of a scene in an engine: labels and values; runs `of_curve` have stiffness factors."""
 
     labels: dict[str, str | float]

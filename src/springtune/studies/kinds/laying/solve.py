@@ -59,11 +59,10 @@ def solve(task):
     points, name = first.pop("outline", np.empty((0, 2))).tolist(), "reference" if is_reference else "strip"
     rows = [{"outline_point": place, f"{name}_x": x, f"{name}_y": y} for place, (x, y) in enumerate(points)]
     rows += [{"corner": place, "trapezoid_x": x, "trapezoid_y": y} for place, (x, y) in enumerate(trapezoid.corners)]
-    if not is_reference:
-        return {"rows": [first, *rows]}
-    if first["status"] != Status.SOLVED:
+    if is_reference and first["status"] != Status.SOLVED:
         return {"rows": rows[len(points) :]}
-    for variable, name in (("reference_area", "area_under_strip"), ("reference_elongation", "elongation")):
+    compared = {"reference_area": "area_under_strip", "reference_elongation": "elongation"} if is_reference else {}
+    for variable, name in compared.items():
         values = [one.get(name, np.nan) for one in found]
         first |= {variable: values[0], f"{variable}_error_estimate": band(values)}
     return {"rows": [first, *rows]}

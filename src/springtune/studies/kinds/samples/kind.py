@@ -308,16 +308,10 @@ def _block_tasks(study):
         yield Task(values, seconds=seconds, name=f"{first}-{last}", file=key, key=key, shared=shared)
 
 
-def _tables(study):
-    sample = study.parts["samples"]
-    return ["sobol"] if sample and sample.design == SOBOL_INDICES else []
-
-
 def _lack(study):
-    sample = study.parts["samples"]
-    if sample and sample.design != SOBOL_INDICES:
-        return f"shows Sobol indices, which the design '{sample.design}' lacks; give design: {SOBOL_INDICES}"
-    return ""
+    design = getattr(study.parts["samples"], "design", SOBOL_INDICES)
+    lack = f"shows Sobol indices, which the design '{design}' lacks; give design: {SOBOL_INDICES}"
+    return "" if design == SOBOL_INDICES else lack
 
 
 def _figures(study):
@@ -339,5 +333,5 @@ KIND = StudyKind(
         Stage("sample", SOLVE, _block_tasks, folder="samples"),
     ),
     outputs=(Output("sobol", "Sobol indices", _figures, plot=f"{FIGURES}:sobol", shows="sampled scenes", lack=_lack),),
-    tables=_tables,
+    tables=lambda study: ["sobol"] if study.parts["samples"] and not _lack(study) else [],
 )

@@ -79,11 +79,6 @@ def _expand(config, declared):
     return {pair: shared | dict(zip(("name", "definition"), pair)) for pair in pairs}
 
 
-def _tables(study):
-    asked = {name for name, _ in study.parts["stability"]}
-    return [f"stability_{name}" for name in TABLES if name in asked]
-
-
 def _axes(experiments):
     names, definitions = (tuple(dict.fromkeys(found)) for found in zip(*experiments))
     sizes = next(iter(experiments.values()))["mesh_sizes"]
@@ -96,9 +91,14 @@ def _tasks(study):
         yield Task(values, also, {"experiment": name, "definition": definition}, seconds=3.0)
 
 
-def _figures(study):
+def _shown(study, names):
+    """Stems of the tables or figures of the experiments of a study."""
     asked = {name for name, _ in study.parts["stability"]}
-    return {f"stability_{name}": {} for name in ("maps", "strains") if name in asked}
+    return [f"stability_{name}" for name in names if name in asked]
+
+
+def _figures(study):
+    return dict.fromkeys(_shown(study, ("maps", "strains")), {})
 
 
 FIGURES = "studies.kinds.stability.figures"
@@ -117,5 +117,5 @@ KIND = StudyKind(
     outputs=(
         Output("stability", "experiments on stability", _figures, plot=f"{FIGURES}:stability", shows="experiments"),
     ),
-    tables=_tables,
+    tables=lambda study: _shown(study, TABLES),
 )
