@@ -235,8 +235,8 @@ def springs(sheet: dict[str, Any], load: str | None, target: Path, **how: Any) -
     from .recommendation import written_text
 
     net = _net(options.read_body(sheet, load), **how)
-    with file_errors(f"--out: {target}"), warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("always", EquilibriumWarning)
+    every = warnings.catch_warnings(record=True, action="always", category=EquilibriumWarning)
+    with file_errors(f"--out: {target}"), every as heard:
         written = net.write(target)
     click.echo(written_text(net, written))
     for one in heard:

@@ -187,8 +187,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     options = [*arguments[named:]]
     if {"--configfile", "--configfiles"} & {one.partition("=")[0] for one in options}:
         raise click.UsageError("give the study itself, without --configfile: springtune run mine.yaml")
-    late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
-    if late:
+    if not named and (late := [one for one in options if one.endswith((".yaml", ".yml"))]):
         first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
         raise click.UsageError(f"name the study first: springtune run {first}")
     if _wants_slurm(options) and not find_spec(SLURM):
@@ -196,8 +195,7 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
         raise click.UsageError(f"{why}; {how_to_install('slurm')}")
     shown = Path(arguments[0]) if named else config_file(USUAL_STUDY)
     path = shown.absolute()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
+    with warnings.catch_warnings(action="ignore", category=AssumptionWarning):  # Snakemake's reading says it
         study = _load(shown)
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
     if results and folder != Path.cwd():

@@ -2,7 +2,6 @@
 
 import math
 import os
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -16,7 +15,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from .messages import Key, Problems, part_of, show
 from .model import Grid
-from .sections import SAME_VALUE, StatedStiffness, StudyConfig, factors
+from .sections import GRID_PARAMETERS, SAME_VALUE, StatedStiffness, StudyConfig, factors
 
 Place = Sequence[Key]  # path in a study
 
@@ -139,18 +138,14 @@ def check_product(problems: Problems, section: object, path: Place, labels: Iter
 def check_scenes(config: StudyConfig, problems: Problems) -> None:
     """Check the number of scenes, and of cells, before grids are expanded."""
     left, what = most_scenes(problems), "scenes"
-    labels: dict[str, set[Any]] = defaultdict(set)
     for name, grid in config.grids.items():
-        parts = factors(grid)
-        lists = {" and ".join(group): rows for group, rows in parts}
+        lists = {" and ".join(group): rows for group, rows in factors(grid)}
         left -= check_count(problems, ("grids", name), lists, left, what, f"{FEWER}, {MORE_SCENES}")
         what = "scenes beside those of the grids above"
-        for group, rows in parts:
-            for label, values in zip(group, zip(*rows)):
-                labels[label] |= set(values)
     problems.stop()
-    used = {name: values for name, values in labels.items() if name not in ("force", "pressure")}
-    check_cells(config, used, False, problems)
+    labels = [name for name in GRID_PARAMETERS if name not in ("force", "pressure")]
+    used = {name: {value for grid in config.grids.values() for value in getattr(grid, name) or ()} for name in labels}
+    check_cells(config, {name: values for name, values in used.items() if values}, False, problems)
 
 
 def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool, problems: Problems) -> None:
@@ -161,8 +156,7 @@ def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool
         of_curves = {name: one for name, one in lists.items() if name not in ("definition", "stiffness_scale")}
         of_curves["points"] = set(range(config.sensitivity.points))
         remedy = "give fewer, or set sensitivity: false in grids that need no curves"
-        path = ("sensitivity", "points")
-        check_count(problems, path, of_curves, MOST_CURVE_POINTS, "points of curves", remedy)
+        check_count(problems, ("sensitivity", "points"), of_curves, MOST_CURVE_POINTS, "points of curves", remedy)
     for name, values in lists.items():
         for one, other in pairwise(sorted(value for value in values if isinstance(value, float))):
             if other - one <= SAME_VALUE * other:

@@ -44,10 +44,9 @@ def load(path: str | Path, kinds: tuple[StudyKind, ...]) -> Study:
     given = content.items() if isinstance(content, dict) else ()
     sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: files}
     config = validated(study_model(kinds), content, problems, context=sections)
-    checks.check_names(config, problems)
-    problems.stop()
-    checks.check_scenes(config, problems)
-    problems.stop()
+    for check in (checks.check_names, checks.check_scenes):
+        check(config, problems)
+        problems.stop()
     for kind in filter(lambda kind: kind.wanted(config), kinds):
         kind.check(config, problems)
     problems.stop()
@@ -221,7 +220,6 @@ def build(config: StudyConfig, kinds: Sequence[StudyKind], problems: Problems, a
     if config.printed and names:
         why = f"printed cells know no {' or '.join(names)}, which grids sweep"
         problems.stop_at(("printed",), f"{why}; give the sweep a study of its own, or remove the key")
-    made = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     calibrated = config.definitions.calibrated
     printed_path = problems.folder / config.printed if config.printed else None
@@ -232,7 +230,7 @@ def build(config: StudyConfig, kinds: Sequence[StudyKind], problems: Problems, a
         curves=in_order(curves),
         references=in_order(references),
         mesh_files=mesh_files,
-        outputs=tuple(name for name in made if name in config.outputs),
+        outputs=tuple(output.name for kind in kinds for output in kind.outputs if output.name in config.outputs),
         style=config.style.model_dump(exclude_none=True),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         materials=bodies.materials,
@@ -248,10 +246,8 @@ def build(config: StudyConfig, kinds: Sequence[StudyKind], problems: Problems, a
         **about,
     )
     for name, output in ((kind.name, one) for kind in kinds for one in kind.outputs if one.name in study.outputs):
-        lack = output.lack(study)
-        if output.shows and not parts[name]:
-            lack = f"shows {output.shows} and the study has none; add a section '{name}'"
-        if lack:
+        none = f"shows {output.shows} and the study has none; add a section '{name}'"
+        if lack := none if output.shows and not parts[name] else output.lack(study):
             problems.add(("outputs",), f"'{output.name}' {lack}")
     problems.stop()
     return study

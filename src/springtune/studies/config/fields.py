@@ -1,11 +1,11 @@
 """Types of the values of a study; messages tell users to give the title of a type."""
 
-import math
 from collections.abc import Collection
 from functools import partial
 from itertools import chain
 from typing import Annotated, Any, Self, TypeVar
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -202,12 +202,8 @@ def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
     >>> spaced(1e-3, 4e-3, 3, "linear"), spaced(1e-3, 4e-3, 3, "logarithmic")
     ([0.001, 0.0025, 0.004], [0.001, 0.002, 0.004])
     """
-    shares = [number / (points - 1) for number in range(1, points - 1)]
-    if spacing == "linear":
-        inside = [first + (last - first) * share for share in shares]
-    else:
-        inside = [math.exp((1 - share) * math.log(first) + share * math.log(last)) for share in shares]
-    return [first, *(float(f"{value:.{RANGE_DIGITS}g}") for value in inside), last]
+    values = (np.linspace if spacing == "linear" else np.geomspace)(first, last, points)
+    return [first, *(float(f"{value:.{RANGE_DIGITS}g}") for value in values[1:-1]), last]
 
 
 def _read_range(value: object, handler: ValidatorFunctionWrapHandler) -> Any:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springtune.problem.materials import AnyMaterial, Material
-from springtune.problem.quantities import nearest, shown_order
+from springtune.problem.quantities import choose, shown_order
 from springtune.problem.shapes import Beam
 from springtune.registry import import_name
 
@@ -176,9 +176,7 @@ class Study:
 
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares."""
-        if name not in self.materials:
-            raise ValueError(f"material: '{name}' is unknown; {nearest(name, self.materials)}")
-        return self.materials[name]
+        return choose(self.materials, name, "material")
 
     def shape(self, name: str) -> Shape:
         """A shape that the study declares, with its loads.
@@ -190,12 +188,9 @@ class Study:
         >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
         patch: -0.4 %
         """
-        known = self.shapes.shape if self.shapes else {}
-        if name not in known:
-            there = nearest(name, known) if known else "the study has none; add it under 'shapes'"
-            raise ValueError(f"shape: '{name}' is unknown; {there}")
-        found: Shape = known[name]
-        return found
+        if not self.shapes:
+            raise ValueError(f"shape: '{name}' is unknown; the study has none; add it under 'shapes'")
+        return choose(self.shapes.shape, name, "shape")
 
     def materials_of(self, shape: str, material: str) -> dict[str, AnyMaterial]:
         """Material of each part of a shape, as the study declares it, and that of the main part, ``""``."""

@@ -155,12 +155,8 @@ class MaterialConfig(Section):
             return Material(self.young_modulus, self.poisson_ratio, self.density, name, self.plane or "stress")
         if self.stiffness is not None:
             return AnisotropicMaterial(**self.stiffness.model_dump(), density=self.density, name=name)
-        own = {key: getattr(self, key) for key in MATERIAL_FORMS[1]}
-        angles = self.angle or [0.0]
-        if len(angles) == 1:
-            return AnisotropicMaterial.orthotropic(**own, angle=angles[0], density=self.density, name=name)
-        ply = AnisotropicMaterial.orthotropic(**own)
-        return AnisotropicMaterial.laminate([(ply, angle, 1.0) for angle in angles], self.density, name)
+        ply = AnisotropicMaterial.orthotropic(**{key: getattr(self, key) for key in MATERIAL_FORMS[1]}, name=name)
+        return AnisotropicMaterial.laminate([(ply, angle, 1.0) for angle in self.angle or [0.0]], self.density, name)
 
 
 class StatedStiffness(Section):
@@ -357,9 +353,8 @@ def combinations(grid: GridConfig) -> Iterator[dict[str, Any]]:
 
 
 def _check_mesh_type_names(files: dict[str, Any]) -> dict[str, Any]:
-    for name in files:
-        if name in MESH_TYPES:
-            raise refuse(f"'{name}' is a mesh type that is made; rename yours", name)
+    for name in filter(MESH_TYPES.__contains__, files):
+        raise refuse(f"'{name}' is a mesh type that is made; rename yours", name)
     return files
 
 
