@@ -214,7 +214,7 @@ def test_errors_are_of_the_definition_the_law_and_the_solver(engine):
     assert found.definition_error == pytest.approx(-0.0156, abs=1e-3)
     assert found.law_error == pytest.approx(0.0188, abs=1e-3) and abs(found.solver_error) < 1e-9
     assert found.error == pytest.approx(found.definition_error + found.law_error + found.solver_error, rel=1e-9)
-    assert all(f"of it {part}" in str(found) for part in ("definition", "law", "solver"))
+    assert all(f"from the {part}" in str(found) for part in ("definition", "law", "solver"))
     st.ENGINES.discard("by-law")
 
 
