@@ -286,11 +286,9 @@ def _draw_deformed(panel, part):
     """Draw the network of a beam; return notes."""
     fields, root = part
     # Of the meshes that this beam has, the one that this load is asked for on.
-    for known in (fields.displacement_x, fields.x.where(root.status != 0), fields.x):
-        places = np.flatnonzero(known.notnull().any("particle").values)
-        if len(places):
-            break
-    here = fields.isel(mesh_size=places[-1] if len(places) else 0)
+    wanted = fields.displacement_x, fields.x.where(root.status != 0), fields.x
+    places = (np.flatnonzero(known.notnull().any("particle").values) for known in wanted)
+    here = fields.isel(mesh_size=next(filter(len, places), [0])[-1])
     scale, flag = magnification(here), int(root.status.sel(mesh_size=here.mesh_size.values))
     draw_network(panel, here, scale)
     text = f"{panel.get_title('left')}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"

@@ -166,8 +166,7 @@ def _beam_groups(study, folder):
     _write_errors(data.deformation_error, data.displacement, data.reference_displacement)
     found = {"/": data}
     if study.curves:
-        group = swept(SENSITIVITY, study)
-        found["/sensitivity"] = group.of_rows(axes, _curve_rows(study, folder, answers))
+        found["/sensitivity"] = swept(SENSITIVITY, study).of_rows(axes, _curve_rows(study, folder, answers))
     if study.further_references:
         rows, group = [*planes, *_finite_reference_rows(study, folder)], swept(FINITE_STRAIN, study)
         finite = found["/finite_strain"] = group.of_rows(axes | {"reference": study.further_references}, rows)
@@ -181,8 +180,7 @@ def _beam_groups(study, folder):
         block = found["/block"] = group.of_rows(axes | own, rows)
         _write_errors(block.face_error, block.face_displacement, block.reference_face_displacement)
     if keeps_fields(study):
-        rows = [*fields, *_rest_rows(study, folder)]
-        found["/fields"] = _fields_of_rows(fields_of(study), axes, rows)
+        found["/fields"] = _fields_of_rows(fields_of(study), axes, [*fields, *_rest_rows(study, folder)])
     return found
 
 

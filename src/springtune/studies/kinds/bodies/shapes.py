@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, ValidatorFunctionWrapHandler, WithJsonSchema, WrapValidator, model_validator
@@ -403,8 +403,7 @@ class ShapeScene:
         return DEFINITIONS[self.definition].law if self.kinematics == "nonlinear" else ""
 
 
-@dataclass(frozen=True)
-class Shapes:
+class Shapes(NamedTuple):
     """Shapes of a study by name, with materials of parts, scenes, refinements, mesh files and referred cases."""
 
     shape: dict[str, Shape]

@@ -13,8 +13,8 @@ A trapezoid far stiffer than the strip is rigid: it has no unknowns, like the fl
 """
 
 import time
-from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,7 @@ from springtune.springs.base import DefinitionError
 RIGID_MODULUS_RATIO = 1e4  # ratio of Young's moduli above which the trapezoid is rigid
 
 
-@dataclass(frozen=True)
-class Trapezoid:
+class Trapezoid(NamedTuple):
     """Symmetric trapezoid on its lower base; lengths in m."""
 
     lower_base: float

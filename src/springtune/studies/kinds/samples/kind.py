@@ -178,8 +178,7 @@ class SamplesConfig(Section):
     @property
     def drawn(self) -> dict[str, Drawn]:
         """Distribution of each given parameter."""
-        given = {name: getattr(self.parameters, name) for name in PARAMETERS}
-        return {name: one for name, one in given.items() if one is not None}
+        return {name: one for name, one in self.parameters if one is not None}
 
     @property
     def drawing(self) -> dict[str, Any]:

@@ -18,6 +18,8 @@ from . import AXES, DEFINITION_FREE, EXPERIMENTS
 TABLES = ("limits", "rest", "slivers", "strains", "perturbation", "buckling")
 """Experiments with a table, see `springtune.studies.kinds.stability.figures`."""
 
+MESHES = [name for name, one in MESH_TYPES.items() if one.corners == 3]
+MeshType = Annotated[str, *one_of("mesh type of triangles", MESHES)]
 ExperimentName = Annotated[str, *one_of("experiment", EXPERIMENTS)]
 
 
@@ -36,7 +38,7 @@ class StabilityConfig(Section):
     definition: fields.DefinitionNames
     """Definitions that derive a stiffness without a reference. Some experiments use only the first."""
 
-    mesh_type: fields.MeshType = default("structured")
+    mesh_type: MeshType = default("structured")
     """Mesh type of triangles."""
 
     mesh_size: OneOrMore[fields.Length]
@@ -53,10 +55,6 @@ def _check(config, problems):
     check_beam_material(problems, ("stability", "material"), section.material, config)
     check_density(config, section.material, ("stability", "material"), problems)
     check_able(problems, ("stability", "definition"), section.definition, ["structured"])
-    made = [name for name, one in MESH_TYPES.items() if one.corners == 3]
-    if section.mesh_type not in made:
-        message = f"'{section.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
-        problems.add(("stability", "mesh_type"), message)
     extent = config.beams[section.beam].length, config.beams[section.beam].height
     check_particles(problems, ("stability", "mesh_size"), section.mesh_size, *extent)
     if (largest := max(section.mesh_size)) > 0.3 * min(extent):
