@@ -194,7 +194,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     rows = _errors_by_quantity(whole, material, kinematics)
     known = {name for row in rows.values() for name in row}
     names = [name for name in (*whole.definition.values.tolist(), REFERENCE_COLUMN) if name in known]
-    errors = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=names)
+    errors = pd.DataFrame([*rows.values()], [*rows], names)
     asked = np.array([[name in row for name in names] for row in rows.values()])
     _, ((panel,),) = style.panels(ax, figsize=(style.PAGE_WIDTH, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
