@@ -78,8 +78,9 @@ def in_benchmark(load: str) -> bool:
 
 def _check(config, problems):
     section = config.benchmark
-    labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
-    check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
+    check_product(
+        problems, section, ("benchmark",), ("scenes", "definition", "mesh_type", "approach", "mesh_size"), MOST_RUNS
+    )
     for beam in dict.fromkeys(scene.beam for scene in section.scenes.values()):
         extent, largest = (config.beams[beam].length, config.beams[beam].height), max(section.mesh_size)
         check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
@@ -140,7 +141,7 @@ def _figures(study):
     return {f"benchmark_{scene}": {"scene": scene} for scene in study.parts["benchmark"]}
 
 
-FIGURES = "studies.kinds.benchmark.figures"
+PLOTS = "studies.kinds.benchmark.figures"
 
 KIND = StudyKind(
     "benchmark",
@@ -151,8 +152,6 @@ KIND = StudyKind(
     summary=lambda part: [["benchmark", len(part), "cases, timed one by one"]],
     **declared(__file__),
     stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
-    outputs=(
-        Output("benchmark", "run time against error", _figures, plot=f"{FIGURES}:benchmark", shows="a benchmark"),
-    ),
+    outputs=(Output("benchmark", "run time against error", _figures, plot=f"{PLOTS}:benchmark", shows="a benchmark"),),
     tables=lambda study: ["benchmark", "explicit_steps"] if study.parts["benchmark"] else [],
 )

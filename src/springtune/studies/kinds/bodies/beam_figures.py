@@ -222,8 +222,7 @@ SHOWN_FIRST = ("patch", "delingette", "lattice", "calibrated", "paper")
 
 def deformed(tree):
     """Stem, plotting function and selection of each figure of deformed networks."""
-    status = group(tree, "/").status
-    status = status.sel(definition=group(tree, "fields").definition.values)
+    status = group(tree, "/").status.sel(definition=group(tree, "fields").definition.values)
     for stem, selection in selections("deformed", status != 0):
         here = status.sel(selection)
         solved = here.isin((1, 2, 4))

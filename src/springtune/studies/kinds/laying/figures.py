@@ -62,7 +62,7 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
 
 def _draw_row(shape, area, elongation, laid, cell, names):
     friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
-    style.add_note(shape, [_draw_shape(shape, laid, names)])
+    style.add_note(shape, [_draw_shape(shape, laid)])
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
     shape.set(aspect="equal", adjustable="datalim")
     known, reference = 100 * float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
@@ -89,7 +89,7 @@ def _outline_points(laid, name):
     return points[np.isfinite(points[:, 0])]
 
 
-def _draw_shape(panel, laid, names):
+def _draw_shape(panel, laid):
     """Draw trapezoid, reference and the finest solved network; return a note that names them."""
     panel.fill(*_outline_points(laid, "trapezoid").T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
     panel.axhline(0, color="0.45", linewidth=0.8)
@@ -97,13 +97,10 @@ def _draw_shape(panel, laid, names):
     if len(reference):
         panel.fill(*reference.T, facecolor="0.72", edgecolor="none")
         said = "grey: finite elements"
-    for definition in names:
-        strips = laid.sel(definition=definition)
-        for place in np.flatnonzero(strips.status.values == 1)[:1]:
-            strip = strips.isel(mesh_size=place)
-            points = _outline_points(strip, "strip")
-            panel.plot(*np.vstack([points, points[:1]]).T, color=style.line(1)["color"], linewidth=0.9)
-            return f"{said}; line: {definition}, {1e3 * float(strip.mesh_size):g} mm"
+    for cell in cells(laid.status == 1, ("definition", "mesh_size"))[:1]:
+        points = _outline_points(laid.sel(cell), "strip")
+        panel.plot(*np.vstack([points, points[:1]]).T, color=style.line(1)["color"], linewidth=0.9)
+        return f"{said}; line: {cell['definition']}, {1e3 * cell['mesh_size']:g} mm"
     return f"{said}; no network was solved"
 
 

@@ -119,7 +119,7 @@ def _tasks(study):
         yield Task(values, also, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
 
 
-FIGURES = "studies.kinds.laying.figures"
+PLOTS = "studies.kinds.laying.figures"
 
 KIND = StudyKind(
     "laying",
@@ -131,7 +131,7 @@ KIND = StudyKind(
     **declared(__file__),
     stages=(Stage("laying", "studies.kinds.laying.solve", _tasks),),
     outputs=(
-        Output("laying", "laid strips", lambda study: {"laying": {}}, plot=f"{FIGURES}:laying", shows="laid strips"),
+        Output("laying", "laid strips", lambda study: {"laying": {}}, plot=f"{PLOTS}:laying", shows="laid strips"),
     ),
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
 )

@@ -90,7 +90,7 @@ def _lack(study):
     return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
 
 
-FIGURES = "studies.kinds.moduli.figures"
+PLOTS = "studies.kinds.moduli.figures"
 
 KIND = StudyKind(
     "moduli",
@@ -103,6 +103,6 @@ KIND = StudyKind(
     **declared(__file__),
     attributes=_attributes,
     stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),
-    outputs=(Output("definitions", "comparison of definitions", _figures, plot=f"{FIGURES}:definitions", lack=_lack),),
+    outputs=(Output("definitions", "comparison of definitions", _figures, plot=f"{PLOTS}:definitions", lack=_lack),),
     tables=lambda study: ["definitions"] if study.parts["moduli"] and study.scenes else [],
 )

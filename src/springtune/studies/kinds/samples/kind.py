@@ -318,7 +318,7 @@ def _figures(study):
     return {stem("sobol", {"load": load}): {"load": load} for load in sample.load} if sample else {}
 
 
-FIGURES = "studies.kinds.samples.figures"
+PLOTS = "studies.kinds.samples.figures"
 
 KIND = StudyKind(
     "samples",
@@ -331,6 +331,6 @@ KIND = StudyKind(
         Stage("interpolate", INTERPOLATE, _reference_tasks, folder="samples"),
         Stage("sample", SOLVE, _block_tasks, folder="samples"),
     ),
-    outputs=(Output("sobol", "Sobol indices", _figures, plot=f"{FIGURES}:sobol", shows="sampled scenes", lack=_lack),),
+    outputs=(Output("sobol", "Sobol indices", _figures, plot=f"{PLOTS}:sobol", shows="sampled scenes", lack=_lack),),
     tables=lambda study: ["sobol"] if study.parts["samples"] and not _lack(study) else [],
 )

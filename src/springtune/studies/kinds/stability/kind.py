@@ -99,7 +99,7 @@ def _figures(study):
     return dict.fromkeys(_shown(study, ("maps", "strains")), {})
 
 
-FIGURES = "studies.kinds.stability.figures"
+PLOTS = "studies.kinds.stability.figures"
 
 KIND = StudyKind(
     "stability",
@@ -113,7 +113,7 @@ KIND = StudyKind(
     sparse=True,
     stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
     outputs=(
-        Output("stability", "experiments on stability", _figures, plot=f"{FIGURES}:stability", shows="experiments"),
+        Output("stability", "experiments on stability", _figures, plot=f"{PLOTS}:stability", shows="experiments"),
     ),
     tables=lambda study: _shown(study, TABLES),
 )
