@@ -179,8 +179,8 @@ class Registry(ExtensibleMapping[Function]):
         self._package = package
         self._complete = False
 
-    def declare(self, entry: Function) -> None:
-        """Add an entry; one declared again from the same place, as in a notebook cell, replaces the former one."""
+    def declare(self, entry: Function) -> Any:
+        """Add an entry, and return its function; one declared again, as in a notebook cell, replaces the former one."""
         if not (isinstance(entry.name, str) and NAME.fullmatch(entry.name)):
             raise ValueError(f"{self._what}: {entry.name!r} cannot name one; {NAME_RULE}")
         if not callable(entry.function):
@@ -196,6 +196,7 @@ class Registry(ExtensibleMapping[Function]):
             )
         entries = [*(self._entries | {entry.name: entry}).values()]
         self._entries = {one.name: one for one in sorted(entries, key=lambda one: (one.order, one.name))}
+        return entry.function
 
     def discard(self, name: str) -> None:
         """Remove an entry; unknown names are ignored."""

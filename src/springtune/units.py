@@ -95,10 +95,9 @@ class UnitError(ValueError):
 def parse(text: str, dimension: str) -> float:
     """Return the number in SI units of a quantity; its number may be a fraction, such as 1/60."""
     wanted = QUANTITY_DIMENSIONS[dimension]
-    if len(text) > LONGEST_QUANTITY:
-        text = f"{text[:57]}..."
-        raise UnitError(f"'{text}' is too long; give {wanted.words}")
     remedy = f"give {wanted.words}"
+    if len(text) > LONGEST_QUANTITY:
+        raise UnitError(f"'{text[:57]}...' is too long; {remedy}")
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
         raise UnitError(f"'{text}' does not begin with a finite number; {remedy}")

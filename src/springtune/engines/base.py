@@ -327,12 +327,7 @@ def engine(name: str, *, order: float = 1000, **declared: Any) -> Callable[[Func
     -100 %
     >>> st.ENGINES.discard("still")
     """
-
-    def declare(function: Function) -> Function:
-        ENGINES.declare(Engine(name, function, order, **declared))
-        return function
-
-    return declare
+    return lambda function: ENGINES.declare(Engine(name, function, order, **declared))
 
 
 # -- textbook solvers --------------------------------------------------------------------------------------------------

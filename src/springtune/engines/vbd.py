@@ -103,7 +103,20 @@ def _sweeps(x, y, inertia, weights, springs, squares, triangles, quads, iteratio
     return x
 
 
-class _Descent(Textbook):
+VERTEX_LAWS = ("area", "biquadratic")  # energies besides springs
+
+COMMON_ATTRIBUTES: dict[str, Any] = {
+    "laws": VERTEX_LAWS,
+    "parameters": energy_parameters(*VERTEX_LAWS),
+    "measured": "1e-6, twenty scenes",
+    "source": "Chen 2024",
+}
+
+
+@engine("vbd-inertia", order=41, **COMMON_ATTRIBUTES)
+class Inertial(Textbook):
+    """Vertex block descent from the inertial position."""
+
     adaptive = False
     """Whether a step begins at the adaptive guess, or at the inertial position."""
 
@@ -139,23 +152,8 @@ class _Descent(Textbook):
         return _sweeps(x, y, self.inertia, self.weights, *self.groups, self.iterations)
 
 
-VERTEX_LAWS = ("area", "biquadratic")  # energies besides springs
-
-COMMON_ATTRIBUTES: dict[str, Any] = {
-    "laws": VERTEX_LAWS,
-    "parameters": energy_parameters(*VERTEX_LAWS),
-    "measured": "1e-6, twenty scenes",
-    "source": "Chen 2024",
-}
-
-
 @engine("vbd", order=40, **COMMON_ATTRIBUTES)
-class Adaptive(_Descent):
+class Adaptive(Inertial):
     """Vertex block descent from its paper's adaptive guess: at rest exact with any number of iterations."""
 
     adaptive = True
-
-
-@engine("vbd-inertia", order=41, **COMMON_ATTRIBUTES)
-class Inertial(_Descent):
-    """Vertex block descent from the inertial position."""

@@ -30,11 +30,6 @@ class Array(NamedTuple):
     heads: tuple[str, ...]
     of: str = ""
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of a row."""
-        return (len(self.heads),) if len(self.heads) > 1 else ()
-
 
 ARRAYS = {
     "points": Array(float, ("x [m]", "y [m]")),
@@ -88,7 +83,8 @@ def _checked(found: dict[str, Any]) -> Net:
     for name, about in ARRAYS.items():
         if found[name] is None and name == "masses":
             continue
-        array: np.ndarray = np.array(found[name], dtype=about.dtype).reshape(-1, *about.shape)
+        row = (len(about.heads),) if len(about.heads) > 1 else ()
+        array: np.ndarray = np.array(found[name], dtype=about.dtype).reshape(-1, *row)
         arrays[name] = array
         if len(array) != rows.setdefault(about.of or name, len(array)):
             raise ValueError(f"{name} of {len(array)} rows in the place of {rows[about.of]}")

@@ -32,8 +32,7 @@ def mjcf(net: Net) -> str:
 
 def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
     """Model of a net that moves as a simulation says, by one of MuJoCo's integrators."""
-    moving = ~net.held.all(axis=1)
-    least = float(simulation.masses[moving].min())
+    least = float(simulation.masses[~net.held.all(axis=1)].min())
     if least < LEAST_MASS:
         why = f"the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more"
         raise ValueError(f"masses: {why}; take larger cells")

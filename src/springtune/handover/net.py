@@ -256,8 +256,7 @@ class SpringNet(Tabled, Net):
         if load and load.get("prescribed"):
             why = "prescribes displacements, which no file of springs has"
             raise ValueError(f"load {load['name']!r}: {why}; take a load of forces")
-        written: list[Path] = hook("files").write(path, self)
-        return written
+        return hook("files").write(path, self)
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
@@ -402,8 +401,7 @@ def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     from ..reference.small_strain import ReferenceNotConvergedError
 
     if (count := len(scene.mesh.points)) > SEARCHED_PARTICLES:
-        names = [one.name for one in scene.case.quantities]
-        return dict.fromkeys(names, TOO_MANY.format(count, SEARCHED_PARTICLES))
+        return dict.fromkeys([one.name for one in scene.case.quantities], TOO_MANY.format(count, SEARCHED_PARTICLES))
     linear = ShapeProblem(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.sheet)
     try:
         values = linear.reference_values()

@@ -245,8 +245,7 @@ def simulate(
         ratio = min(lowest / loaded, 1.0)
         beyond = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
         tangents = (network.tangent(share * displacements) for share in (1.0, 1.0 + beyond))
-        stiffest = max(map(motion.highest_frequency, tangents))
-        stable = min(stable, 2 / stiffest)
+        stable = min(stable, 2 / max(map(motion.highest_frequency, tangents)))
     step = STABLE_STEP_SHARE * stable
     return Simulation(net.masses, force, largest, step, lowest, loaded, damping, displacements, why)
 
@@ -288,11 +287,10 @@ def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -
 
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
     """Refuse a net that a simulator cannot represent."""
-    name = net.header["definition"]
     lacking = next((ENERGY_WORDS[terms.kind] for terms in net.energies if terms.kind not in laws), "")
     if lacking:
         why = f"has energies of {lacking}, and {program} has no such law"
-        raise ValueError(f"definition '{name}': {why}; take one such as 'patch'")
+        raise ValueError(f"definition '{net.header['definition']}': {why}; take one such as 'patch'")
     if net.masses is None:
         materials = (net.header["material"], *net.header.get("other_materials", {}).values())
         light = next(one["name"] for one in materials if one.get("density") is None)

@@ -70,8 +70,7 @@ def _blocks(net: Net, terms: Terms) -> Blocks:
         for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
             stiffness[:, j, k] = stiffness[:, k, j] = values["coupling"][:, i] / 2
         least, _, most = np.linalg.eigvalsh(stiffness).T
-        which = "triangles have squared lengths that are not stable by themselves"
-        _check_positive(net, least - 1e-12 * most, which)
+        _check_positive(net, least - 1e-12 * most, "triangles have squared lengths that are not stable by themselves")
         return Blocks(kind, cells, np.linalg.inv(stiffness), {"rest_length": values["rest_length"]})
     areas = values["rest_area"]
     if kind == "area":

@@ -436,13 +436,8 @@ def mesh_type(
     (5, [0.2, 0.04])
     >>> st.MESH_TYPES.discard("two")
     """
-
-    def declare(function: Function) -> Function:
-        if corners not in SIDES:
-            raise ValueError(f"mesh type {name!r}: corners {corners!r}; cells have 3 or 4")
-        if not (isinstance(row_height, Real) and 0 < row_height < math.inf):
-            raise ValueError(f"mesh type {name!r}: row_height {row_height!r} is not a number above zero; give one")
-        MESH_TYPES.declare(MeshType(name, function, order, corners, row_height))
-        return function
-
-    return declare
+    if corners not in SIDES:
+        raise ValueError(f"mesh type {name!r}: corners {corners!r}; cells have 3 or 4")
+    if not (isinstance(row_height, Real) and 0 < row_height < math.inf):
+        raise ValueError(f"mesh type {name!r}: row_height {row_height!r} is not a number above zero; give one")
+    return lambda function: MESH_TYPES.declare(MeshType(name, function, order, corners, row_height))

@@ -111,8 +111,7 @@ def _points(file: _Numbers) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     for _ in range(file.blocks()):
         dimension, _, parametric = file.take("i", 3)
         count, width = file.one("u"), 3 + bool(parametric) * dimension
-        tags = file.take("u", count)
-        yield tags, file.take("f", count * width).reshape(count, width)[:, :3]
+        yield file.take("u", count), file.take("f", count * width).reshape(count, width)[:, :3]
 
 
 def _groups(file: _Numbers) -> dict[tuple[int, int], list[int]]:

@@ -32,7 +32,10 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.ndarr
         near = (low[one, 1] <= high[other, 1]) & (low[other, 1] <= high[one, 1])
         near &= (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2))
         one, other = one[near], other[near]
-        close = _edge_distances(start[one], end[one], start[other], end[other]) <= reach[one] + reach[other]
+        a, b, c, d = start[one], end[one], start[other], end[other]
+        crossing = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
+        distance = np.min([away(a, c, d), away(b, c, d), away(c, a, b), away(d, a, b)], axis=0)
+        close = crossing | (distance <= reach[one] + reach[other])
         found.append(np.stack([one, other], axis=1)[close])
         begin = stop
     return np.concatenate(found)
@@ -49,13 +52,6 @@ def away(point: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
     along = two - one
     share = np.clip(((point - one) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
     return np.asarray(np.linalg.norm(point - one - share[:, None] * along, axis=1))
-
-
-def _edge_distances(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Distance of each edge from a to b from the one from c to d [m]."""
-    crossing = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
-    distance = np.min([away(a, c, d), away(b, c, d), away(c, a, b), away(d, a, b)], axis=0)
-    return np.where(crossing, 0.0, distance)
 
 
 def winding(start: np.ndarray, end: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -563,11 +563,10 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     >>> {part: one.name for part, one in of_parts({"": steel, "core": foam}, ["core", "rim"]).items()}
     {'core': 'foam', 'rim': 'steel'}
     """
-    names = ", ".join(map(repr, parts))
     if len(parts) > 1 and not any(given):
         example = next(filter(None, parts))
         remedy = f"name those of others, such as {{'': ..., {example!r}: ...}}, as `study.materials_of` does"
-        raise ValueError(f"material: one is given, and the body has the parts {names}; {remedy}")
+        raise ValueError(f"material: one is given, and the body has the parts {', '.join(map(repr, parts))}; {remedy}")
     for part in parts:
         if part not in given and "" not in given:
             which = f"part {part!r}" if part else "the main part, ''"

@@ -311,8 +311,7 @@ class Support:
         _check_name(self.group, "group of a support")
         for axis in ("x", "y"):
             if getattr(self, axis) is not None:
-                value = quantity(getattr(self, axis), "length", f"support on {self.group!r}, {axis}")
-                put(self, **{axis: value})
+                put(self, **{axis: quantity(getattr(self, axis), "length", f"support on {self.group!r}, {axis}")})
         if self.x is None and self.y is None:
             raise ValueError(f"support on {self.group!r}: holds neither x nor y; give x=0, y=0 or both")
 
@@ -634,12 +633,11 @@ class Shape:
     def _check_rounds(self) -> None:
         """Refuse rounds that meet each other or themselves, or are at a wrong place; turn a clockwise outline."""
         sides = _round(self.outline, "outline")
-        (left, low), (right, high) = extent(sides)
-        size = max(right - left, high - low)
+        least = SIDE_TOLERANCE * max(high - low for low, high in zip(*extent(sides)))
         rounds = [("outline", sides)]
         rounds += [(f"hole {number}", _round(hole.outline, "hole")) for number, hole in enumerate(self.holes, start=1)]
         for what, one in rounds:
-            short = [i for i, side in enumerate(one, 1) if math.dist(*extent([side])) < SIDE_TOLERANCE * size]
+            short = [i for i, side in enumerate(one, 1) if math.dist(*extent([side])) < least]
             if short:
                 raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
             for before, side in zip((one[-1], *one[:-1]), one):
@@ -660,8 +658,7 @@ class Shape:
             if inside and not hole.part:
                 raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
         if enclosed(sides) < 0:
-            back = tuple(Segment(one.start, one.centre, one.group) for one in reverse_round(sides))
-            put(self, outline=back)
+            put(self, outline=tuple(Segment(one.start, one.centre, one.group) for one in reverse_round(sides)))
         if names := sorted({*self.groups} & {*self.points}):
             raise ValueError(f"{names[0]!r} names a point and sides; rename one of them")
 

@@ -1,11 +1,11 @@
 """Boundary-value problems of scenes: a beam under a force, or a shape under a load case."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from numbers import Real
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,9 +39,6 @@ MOST_DISTANCE_FROM_SIDE = 1e-5
 
 LEAST_COVERED = 0.9
 """Least length of a group's edges over the length of its sides: six chords are 5 % shorter than a circle."""
-
-
-Answer = TypeVar("Answer")
 
 
 class BoundaryProblem(ABC):
@@ -455,9 +452,7 @@ def _distances(side: OutlineSide, points: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(points - nearest, axis=1))
 
 
-@lru_cache(maxsize=64)
-def _solve_once(solve: Callable[..., Answer], *problem: Any) -> Answer:
-    return solve(*problem)
+_solve_once = lru_cache(maxsize=64)(lambda solve, *problem: solve(*problem))
 
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":

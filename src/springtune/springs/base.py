@@ -250,17 +250,12 @@ def definition(
     105000000.0
     >>> st.DEFINITIONS.discard("half")
     """
-
-    def declare(function: Function) -> Function:
-        if not isinstance(cells, tuple | list | set) or not set(cells) <= {3, 4} or not cells:
-            raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
-        if needs not in NEEDS:
-            raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant, cost
-        DEFINITIONS.declare(Definition(name, function, order, *traits))
-        return function
-
-    return declare
+    if not isinstance(cells, tuple | list | set) or not set(cells) <= {3, 4} or not cells:
+        raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
+    if needs not in NEEDS:
+        raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
+    traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant, cost
+    return lambda function: DEFINITIONS.declare(Definition(name, function, order, *traits))
 
 
 def membrane_stiffness(material: AnyMaterial, thickness: float) -> float:
