@@ -37,7 +37,7 @@ def elsewhere(tmp_path_factory, monkeypatch):
 def scene(mesh_type="structured", load="traction", definition="lattice", force=None, size="5 mm", **options):
     """A scene of the beam of these tests."""
     material = options.pop("material", STEEL)
-    mesh = options["sheet"].mesh if options.get("sheet") else st.make_mesh(BEAM, mesh_type, size)
+    mesh = options["cache"].mesh if options.get("cache") else st.make_mesh(BEAM, mesh_type, size)
     return st.Scene(BEAM, mesh, material, load, force or FORCES[load], definition=definition, **options)
 
 
@@ -78,7 +78,7 @@ MESHES = ("structured", "free", "right", "alternating", "braced")
 @pytest.mark.parametrize("mesh_type", MESHES)
 def test_equilibria_are_those_of_mujoco(mesh_type, size, every, tmp_path):
     """Each definition under all loads or one, which changes from one to the next; or it is refused for its energies."""
-    sheet, turn = None, MESHES.index(mesh_type)
+    cache, turn = None, MESHES.index(mesh_type)
     balanced, refused = set(), set()
     for number, (name, definition) in enumerate(st.DEFINITIONS.items()):
         if definition.needs == "cases":  # searches on a scene's reference, whose springs are such as all others
@@ -86,8 +86,8 @@ def test_equilibria_are_those_of_mujoco(mesh_type, size, every, tmp_path):
         told = {"stiffness": "170e6 N/m"} if definition.needs == "stiffness" else {}
         loads = LOADED if every else (LOADED[(number + turn) % len(LOADED)],)
         for load in ("traction", "compression") if definition.uniaxial else loads:
-            one = scene(mesh_type, load, name, size=size, sheet=sheet, **told)
-            sheet = one.sheet
+            one = scene(mesh_type, load, name, size=size, cache=cache, **told)
+            cache = one.cache
             try:
                 result = one.solve()
             except st.DefinitionError:  # not on this mesh

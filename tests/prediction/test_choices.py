@@ -180,14 +180,14 @@ def random_mesh(random, aspect, most):
 
 def compared(beam, mesh, material, choices, loads):
     """Numbers that predictions and scenes agree on, within .2 points or a tenth and in truth far better."""
-    sheet, count = None, 0
+    cache, count = None, 0
     for choice in choices:
         if "springs" in choice.failures:
             continue
         for load in loads:
-            options = {"definition": choice.definition, "kinematics": "linear", "sheet": sheet}
+            options = {"definition": choice.definition, "kinematics": "linear", "cache": cache}
             scene = st.Scene(beam, mesh, material, load, 1.0, **options)
-            sheet, result, said = scene.sheet, scene.solve(), choice.errors[load]
+            cache, result, said = scene.cache, scene.solve(), choice.errors[load]
             if result.status is not st.Status.SOLVED:
                 assert np.isnan(said) and choice.failures
                 continue
@@ -264,12 +264,12 @@ def seeded(seed):
 
 def worst_by_scenes(body, mesh, material, about, name):
     """Whether a definition has energies, and its worst error by scenes; None where it is refused."""
-    worst, sheet, options = [], None, {"definition": name, "kinematics": "linear"}
+    worst, cache, options = [], None, {"definition": name, "kinematics": "linear"}
     for load in about.get("loads", [about.get("load")]):
         force = () if "load" in about else (1.0,)
         try:
-            scene = st.Scene(body, mesh, material, load, *force, **options, sheet=sheet)
-            result, sheet, energies = scene.solve(), scene.sheet, bool(scene.springs.energies)
+            scene = st.Scene(body, mesh, material, load, *force, **options, cache=cache)
+            result, cache, energies = scene.solve(), scene.cache, bool(scene.springs.energies)
         except st.DefinitionError:
             return None
         except SingularError:

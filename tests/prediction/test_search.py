@@ -17,11 +17,11 @@ BEAM, STEEL = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7
 
 def worst(beam, material, one, size, loads):
     """Largest error of a choice's definition on another mesh of its type, by scenes."""
-    mesh, errors, sheet = st.make_mesh(beam, one.mesh_type, size), [], None
+    mesh, errors, cache = st.make_mesh(beam, one.mesh_type, size), [], None
     for load in loads:
-        options = {"definition": one.choice.definition, "kinematics": "linear", "sheet": sheet}
+        options = {"definition": one.choice.definition, "kinematics": "linear", "cache": cache}
         scene = st.Scene(beam, mesh, material, load, 1.0, **options)
-        result, sheet = scene.solve(), scene.sheet
+        result, cache = scene.solve(), scene.cache
         errors.append(abs(result.error) if result.status is st.Status.SOLVED else np.inf)
     return max(errors)
 

@@ -32,9 +32,9 @@ def lift(monkeypatch):
 def network_displacement(beam, material, force, kind, definition, size, mesh_type="structured"):
     """Displacement of a load on a linear network [m]."""
     mesh = st.MESH_TYPES[mesh_type](beam.length, beam.height, size)
-    sheet = MeshCache(mesh, beam.thickness)
-    springs, _ = sheet.derive(definition, material)
-    return sheet.solve(kind, springs, force, "linear").displacement
+    cache = MeshCache(mesh, beam.thickness)
+    springs, _ = cache.derive(definition, material)
+    return cache.solve(kind, springs, force, "linear").displacement
 
 
 @pytest.mark.parametrize("kind", [AXIAL, BENDING, SHEAR, FACE, LIFT, BUILT_IN])

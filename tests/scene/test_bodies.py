@@ -127,7 +127,7 @@ def test_scenes_that_share_a_sheet_have_groups_of_their_own():
     first = st.Scene(shape, grouped, STEEL, "push", definition="delingette", kinematics="linear")
     values = first.solve().values
     alone = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear").solve().values
-    shared = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear", sheet=first.sheet)
+    shared = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear", cache=first.cache)
     assert shared.solve().values == alone != values
 
 

@@ -69,7 +69,7 @@ class TestEquilibrium:
         where = mesh.points + (0 if kinematics == "linear" else result.displacements)
         along = where[mesh.edges[:, 1]] - where[mesh.edges[:, 0]]
         pulls = result.spring_forces[:, None] * along / np.linalg.norm(along, axis=1)[:, None]
-        total = found.force * found.sheet.loading(found.kind).pattern
+        total = found.force * found.cache.loading(found.kind).pattern
         np.add.at(total, mesh.edges[:, 0], pulls)
         np.subtract.at(total, mesh.edges[:, 1], pulls)
         largest = np.abs(result.spring_forces).max()
@@ -93,7 +93,7 @@ class TestEquilibrium:
 
 def test_networks_are_shared_between_scenes_of_a_sheet():
     first = scene(definition="paper", stiffness=1e8)
-    others = {"definition": "paper", "stiffness": 2e8, "sheet": first.sheet}
+    others = {"definition": "paper", "stiffness": 2e8, "cache": first.cache}
     second = st.Scene(BEAM, first.mesh, STEEL, "traction", "20 kN", **others)
     bent = st.Scene(BEAM, first.mesh, STEEL, "bending", "200 N", **others)
     assert second.network is first.network is bent.network and second.problem is first.problem
@@ -142,11 +142,11 @@ def task_of(definition, kinematics):
 def test_the_time_of_a_definition_is_taken_off_the_scene_that_spent_it_alone():
     """Scenes that share springs used to lose seconds that none of them had spent, down to below zero."""
     beam = st.Beam(0.05, 0.02)
-    sheet = MeshCache(st.make_mesh(beam, "structured", 5e-3), beam.thickness)
+    cache = MeshCache(st.make_mesh(beam, "structured", 5e-3), beam.thickness)
     results = []
     for kinematics in ("linear", "nonlinear", "linear"):
         begin = time.perf_counter()
-        results.append(solve(task_of("adjoint", kinematics), partial(solve_beam, beam, sheet, None)))
+        results.append(solve(task_of("adjoint", kinematics), partial(solve_beam, beam, cache, None)))
         elapsed = time.perf_counter() - begin
         deriving = results[0]["definition_seconds"] if len(results) == 1 else 0.0
         assert results[-1]["status"] == st.Status.SOLVED

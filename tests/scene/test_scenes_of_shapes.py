@@ -383,8 +383,8 @@ class TestAgainstReferences:
         assert known["force"] == pytest.approx(-8e3, rel=1e-6)
         assert result.errors["end"] == pytest.approx(result.values["end"] / known["end"] - 1, rel=1e-9)
         assert -0.02 < result.error < 0  # linear triangles are too stiff
-        again = st.Scene(self.shape, self.grouped, THIRD, "pull", definition="area", sheet=scene.sheet, scale=2)
-        assert again.reference().values == scene.reference().values and len(scene.sheet.references) == 1
+        again = st.Scene(self.shape, self.grouped, THIRD, "pull", definition="area", cache=scene.cache, scale=2)
+        assert again.reference().values == scene.reference().values and len(scene.cache.references) == 1
         assert again.objection == ""
         far = st.Scene(self.shape, self.grouped, RUBBER, "pull", definition="area")
         assert "the linear reference does not apply" in far.objection

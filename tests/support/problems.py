@@ -13,8 +13,8 @@ from springtune.springs.lattice import uniform
 def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind=AXIAL):
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
     mesh = st.MESH_TYPES[mesh_type](length, height, size)
-    sheet = MeshCache(mesh, 1.0)
-    return sheet.problem(kind, st.Springs(1.0, (relative or uniform)(mesh))), sheet.loading(kind).pattern
+    cache = MeshCache(mesh, 1.0)
+    return cache.problem(kind, st.Springs(1.0, (relative or uniform)(mesh))), cache.loading(kind).pattern
 
 
 CLAMP = (st.Support("left", x=0, y=0),)

@@ -497,7 +497,7 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
 
 def _scene_under(scene: Scene, load: str, size: float) -> Scene:
     """Scene of the same springs under a load of a size."""
-    make = partial(Scene, definition=scene.definition, stiffness=scene.uniform_stiffness, sheet=scene.sheet)
+    make = partial(Scene, definition=scene.definition, stiffness=scene.uniform_stiffness, cache=scene.cache)
     if scene.definition.needs == "cases" and load != scene.load:
         raise EngineError(f"definition '{scene.definition.name}' is fitted to load '{scene.load}' alone")
     if isinstance(scene.boundary_problem, ShapeProblem):

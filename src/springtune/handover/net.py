@@ -148,7 +148,7 @@ class SpringNet(Tabled, Net):
         """
         springs = scene.springs if springs is None else springs
         about, forces = scene.boundary_problem, scene.boundary_problem.forces(springs)
-        parts = _parts(scene.definition, scene.sheet, about.materials, springs, about.masses(), mesh_name, scene.held)
+        parts = _parts(scene.definition, scene.cache, about.materials, springs, about.masses(), mesh_name, scene.held)
         header, follower = parts["header"], about.loading.follower is not None
         load = {"name": scene.load, "kinematics": scene.kinematics, "follower": follower}
         if isinstance(about, ShapeProblem):
@@ -160,7 +160,7 @@ class SpringNet(Tabled, Net):
             header |= {"expected_error": _errors_on_shape(scene, springs), "expected_error_means": MEANING_ON_SHAPES}
         elif errors:
             body = scene.beam, scene.material
-            header["expected_error"] = _expected_errors(scene.sheet, scene.definition, springs, *body, None, scene.load)
+            header["expected_error"] = _expected_errors(scene.cache, scene.definition, springs, *body, None, scene.load)
         return cls(**(parts | {"forces": forces}))
 
     @classmethod
@@ -216,20 +216,20 @@ class SpringNet(Tabled, Net):
         elif loads is not None:
             raise ValueError(f"loads: {loads!r} have expected errors on the mesh of a beam alone; give beam, too")
         chosen = definition_of(definition)
-        sheet = MeshCache(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
+        cache = MeshCache(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
         if springs is None:
             given = given_stiffness(chosen, stiffness)
             with naming_errors(chosen):
-                springs = sheet.derive(chosen, material, given)[0]
-        inertia = None if material.density is None else masses(mesh, material.density, sheet.thickness)
-        parts = _parts(chosen, sheet, [material], springs, inertia, mesh_name)
+                springs = cache.derive(chosen, material, given)[0]
+        inertia = None if material.density is None else masses(mesh, material.density, cache.thickness)
+        parts = _parts(chosen, cache, [material], springs, inertia, mesh_name)
         header = parts["header"]
         if beam is None:
             header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
         else:
             header["beam"] = asdict(beam)
             if errors:
-                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, loads)
+                header["expected_error"] = _expected_errors(cache, chosen, springs, beam, material, loads)
         return cls(**parts)
 
     def write(self, path: str | Path) -> list[Path]:
@@ -288,7 +288,7 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
 
 def _parts(
     definition: Definition,
-    sheet: MeshCache,
+    cache: MeshCache,
     materials: Sequence[AnyMaterial],
     springs: Springs,
     inertia: np.ndarray | None,
@@ -296,13 +296,13 @@ def _parts(
     held: np.ndarray | None = None,
 ) -> dict[str, Any]:
     """Arrays and header of a net without a load."""
-    mesh, (formula, source) = sheet.mesh, described(definition)
+    mesh, (formula, source) = cache.mesh, described(definition)
     material, *others = ({name: getattr(one, name, None) for name in MATERIAL_CONSTANTS} for one in materials)
     if inertia is None:
         lacking = next(one.name for one in materials if one.density is None)
         steps: dict[str, float] | str = f"material '{lacking}' has no density"
     else:
-        steps = stable_steps(sheet, springs, inertia, INTEGRATORS, held)
+        steps = stable_steps(cache, springs, inertia, INTEGRATORS, held)
     header = {
         "made_by": f"springtune {__version__}",
         "definition": definition.name,
@@ -311,7 +311,7 @@ def _parts(
         "reference_stiffness": float(springs.reference),
         # Forces on the long faces that belong to the springs; they are part of the forces of a load.
         **({"lateral_stress": springs.lateral} if springs.lateral else {}),
-        "thickness": float(sheet.thickness),
+        "thickness": float(cache.thickness),
         "beam": None,
         "material": material,
         **({"other_materials": {one["name"]: one for one in others}} if others else {}),
@@ -339,7 +339,7 @@ def _parts(
         "stiffness": springs.reference * springs.relative,
         "energies": _merged([terms_of(energy, mesh, springs.reference) for energy in springs.energies]),
         "masses": inertia,
-        "thickness": sheet.thickness,
+        "thickness": cache.thickness,
         "held": np.zeros(mesh.points.shape, dtype=bool) if held is None else held,
         "forces": np.zeros(mesh.points.shape),
         "header": header,
@@ -359,7 +359,7 @@ def described(definition: Definition) -> tuple[str, str]:
 
 
 def _expected_errors(
-    sheet: MeshCache,
+    cache: MeshCache,
     definition: Definition,
     springs: Springs,
     beam: Beam,
@@ -372,14 +372,14 @@ def _expected_errors(
     from ..prediction.choices import SEARCHED_PARTICLES, USUAL_LOADS, check_loads, errors_under, reference_of
 
     names = (*check_loads(USUAL_LOADS if loads is None else loads), *further)
-    if (count := len(sheet.mesh.points)) > SEARCHED_PARTICLES:
+    if (count := len(cache.mesh.points)) > SEARCHED_PARTICLES:
         return dict.fromkeys(names, TOO_MANY.format(count, SEARCHED_PARTICLES))
     why = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
     errors: dict[str, float | str] = dict.fromkeys(names, why)
     for name in errors:
         if LOADS[name].kind.uniaxial or not definition.uniaxial:
             known = {name: reference_of(beam, material, name)}
-            problem = BeamProblem(beam, sheet.mesh, material, name, 1.0, "linear", sheet)
+            problem = BeamProblem(beam, cache.mesh, material, name, 1.0, "linear", cache)
             errors |= _in_words(errors_under(problem, springs, known), known)
     return errors
 
@@ -402,7 +402,7 @@ def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
 
     if (count := len(scene.mesh.points)) > SEARCHED_PARTICLES:
         return dict.fromkeys([one.name for one in scene.case.quantities], TOO_MANY.format(count, SEARCHED_PARTICLES))
-    linear = ShapeProblem(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.sheet)
+    linear = ShapeProblem(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.cache)
     try:
         values = linear.reference_values()
         known = References({name: QuantityReference(value, np.nan) for name, value in values.items()})

@@ -305,7 +305,7 @@ def beam_problems(
     """Statements of 1 N in linear kinematics, one for each load."""
     first, *others = check_loads(loads)
     one = BeamProblem(beam, mesh, material, first, 1.0, "linear")
-    return [one, *(BeamProblem(beam, mesh, material, load, 1.0, "linear", one.sheet) for load in others)]
+    return [one, *(BeamProblem(beam, mesh, material, load, 1.0, "linear", one.cache) for load in others)]
 
 
 def as_sure_as(known: Mapping[str, Any]) -> float:
@@ -378,7 +378,7 @@ class Trial:
     ) -> None:
         self.problems, self.known, first = problems, known, problems[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
-        first.sheet.networks = len({one.loading.held.tobytes() for one in problems})
+        first.cache.networks = len({one.loading.held.tobytes() for one in problems})
         self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamProblem) else None
@@ -426,7 +426,7 @@ class Trial:
         if any(one.kind == "stress" for one in first.case.quantities):  # that is of single springs
             return name
         motion = np.random.default_rng(0).standard_normal(self.mesh.points.shape)
-        forces = springs.reference * first.sheet.network(first.loading.held, springs).linear_forces_over_k(motion)
+        forces = springs.reference * first.cache.network(first.loading.held, springs).linear_forces_over_k(motion)
         for other, known in self._forces.items():
             if np.linalg.norm(forces - known) <= EQUAL_FORCES * np.linalg.norm(known):
                 return other
@@ -478,7 +478,7 @@ class Trial:
             except SingularError as error:
                 failures["patch test"] = f"unstable: {error}"
         errors = {label: nan if isinstance(error, str) else error for label, error in found.items()}
-        words = in_words(self.problems[0].sheet, springs)
+        words = in_words(self.problems[0].cache, springs)
         return Choice(name, *words, bool(springs.energies), errors, float(young), float(poisson), failures)
 
     def step_limit(self, name: str) -> float:
@@ -486,7 +486,7 @@ class Trial:
         inertia = self.problems[0].masses()
         if inertia is None:
             return nan
-        steps = stable_steps(self.problems[0].sheet, self._springs[name], inertia, ["central-difference"])
+        steps = stable_steps(self.problems[0].cache, self._springs[name], inertia, ["central-difference"])
         return nan if isinstance(steps, str) else float(steps["central-difference"])
 
 
@@ -498,15 +498,15 @@ IN_WORDS = (
 """Words for energies besides areas."""
 
 
-def in_words(sheet: MeshCache, springs: Springs) -> tuple[float, float, str]:
+def in_words(cache: MeshCache, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and the rest in words."""
-    mesh = sheet.mesh
+    mesh = cache.mesh
     stiffness = springs.reference * springs.relative
     inside, at_outline, diagonals = (_common_value(stiffness[part]) for part in places(mesh).values())
     extra = []
     for energy in springs.energies:
         if isinstance(energy, AreaEnergy):
-            modulus = _common_value(springs.reference * energy.modulus) / sheet.thickness
+            modulus = _common_value(springs.reference * energy.modulus) / cache.thickness
             extra.append(f"area energy, K_A = {1e-6 * modulus:.4g} MPa")
         else:
             extra.append(next(words for kind, words in IN_WORDS if isinstance(energy, kind)))

@@ -55,7 +55,7 @@ class BoundaryProblem(ABC):
     case: LoadCase
     loading: Loading
     by_part: Mapping[str, AnyMaterial]
-    sheet: MeshCache
+    cache: MeshCache
 
     @property
     def mesh(self) -> Mesh:
@@ -99,11 +99,11 @@ class BoundaryProblem(ABC):
         case = None
         if definition.needs == "cases":
             case = self.loading, self.force, self.reference().at(self.mesh.points) / self.force
-        return self.sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
+        return self.cache.derive(definition, self.by_part, stiffness, case, self.grouped)
 
     def forces(self, springs: Springs) -> np.ndarray:
         """Forces on the particles at rest [N], shape (n_points, 2)."""
-        return self.force * self.sheet.pattern(self.loading, springs)
+        return self.force * self.cache.pattern(self.loading, springs)
 
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
@@ -112,7 +112,7 @@ class BoundaryProblem(ABC):
 
     def solve(self, springs: Springs) -> Solution:
         """Equilibrium, judged; its displacement is the first quantity of interest."""
-        problem = self.sheet.problem(self.loading, springs)
+        problem = self.cache.problem(self.loading, springs)
         value = partial(self._value, self.case.quantities[0], springs, problem.network)
         return solve_and_judge(problem, self.force / springs.reference, self.kinematics, value)
 
@@ -183,16 +183,16 @@ class BeamProblem(BoundaryProblem):
         load: str | Load,
         force: float | str | None,
         kinematics: str,
-        sheet: MeshCache | None = None,
+        cache: MeshCache | None = None,
     ) -> None:
         is_a(beam, Beam, "beam")
         is_a(mesh, Mesh, "mesh")
         is_a(material, Material, "material")
         assert isinstance(mesh, Mesh) and isinstance(material, Material)  # for type checkers
-        self.sheet = sheet_of(mesh, beam.thickness, sheet)
-        if beam not in self.sheet.filled:
+        self.cache = cache_of(mesh, beam.thickness, cache)
+        if beam not in self.cache.filled:
             check_filled(mesh, beam)
-            self.sheet.filled.add(beam)
+            self.cache.filled.add(beam)
         self.load, about = (load.kind.name, load) if isinstance(load, Load) else (load, choose(LOADS, load, "load"))
         if force is None:
             raise ValueError("force: none; give the size of the force on the beam such as '400 kN'")
@@ -202,7 +202,7 @@ class BeamProblem(BoundaryProblem):
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
         self.body, self.label, self.thickness = beam.label, f"{self.load} of {self.size:g} N", beam.thickness
         self.by_part = {"": material}
-        self.grouped, self.loading = self.sheet.loaded(self.kind), self.sheet.loading(self.kind, self.follower)
+        self.grouped, self.loading = self.cache.loaded(self.kind), self.cache.loading(self.kind, self.follower)
 
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the load."""
@@ -224,7 +224,7 @@ class BeamProblem(BoundaryProblem):
 
     def _displacement(self, one: Quantity, moved: np.ndarray) -> float:
         """Displacement of the loaded side [m], by weights that the loads of a kind share."""
-        return self.sheet.displacement(self.kind, moved)
+        return self.cache.displacement(self.kind, moved)
 
     def law(self, definition: Definition) -> str:
         """Law of the reference at finite strain: rubber's, or none."""
@@ -242,7 +242,7 @@ class ShapeProblem(BoundaryProblem):
         load: str,
         scale: float,
         kinematics: str,
-        sheet: MeshCache | None = None,
+        cache: MeshCache | None = None,
     ) -> None:
         is_a(shape, Shape, "shape")
         is_a(grouped, GroupedMesh, "mesh")
@@ -257,7 +257,7 @@ class ShapeProblem(BoundaryProblem):
         self.scale: float = float(scale)
         self.size, self.force = abs(self.scale), 1.0
         self.case = scaled(choose(shape.loads, load, "load"), self.scale)
-        self.load, self.sheet = self.case.name, sheet_of(self.mesh, self.thickness, sheet)
+        self.load, self.cache = self.case.name, cache_of(self.mesh, self.thickness, cache)
         if not self.case.quantities:
             raise ValueError(f"load {load!r}: asks for nothing; give it quantities, the main one first")
         self.kinematics = kinematics
@@ -309,12 +309,12 @@ class ShapeProblem(BoundaryProblem):
         return found
 
     def reference(self, law: str = "") -> "ShapeReference":
-        """Converged finite-element solution, once for all scenes of a sheet."""
+        """Converged finite-element solution, once for all scenes of a cache."""
         case = self.case if law else self.shape.loads[self.load]
         as_read = self.grouped if self.shape.file else None
         # The shape is kept too, so that its id is not used again.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items()), law
-        if key not in self.sheet.references:
+        if key not in self.cache.references:
             if law:
                 from ..reference.finite_shapes import solve_finite_shape  # here, as below
 
@@ -323,8 +323,8 @@ class ShapeProblem(BoundaryProblem):
                 from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
 
                 found = solve_shape(self.shape, case, self.by_part, as_read)
-            self.sheet.references[key] = self.shape, found
-        reference = self.sheet.references[key][1]
+            self.cache.references[key] = self.shape, found
+        reference = self.cache.references[key][1]
         return reference if law or self.scale == 1 else reference.scaled(self.scale)
 
     def law(self, definition: Definition) -> str:
@@ -333,13 +333,13 @@ class ShapeProblem(BoundaryProblem):
         return "" if law == "st-venant" and not self.objection() else law
 
 
-def sheet_of(mesh: Mesh, thickness: float, sheet: MeshCache | None) -> MeshCache:
-    """Return the sheet of another scene, if it is of this mesh and thickness, or a new one."""
-    if sheet is None:
+def cache_of(mesh: Mesh, thickness: float, cache: MeshCache | None) -> MeshCache:
+    """Return the cache of another scene, if it is of this mesh and thickness, or a new one."""
+    if cache is None:
         return MeshCache(mesh, thickness)
-    if not isinstance(sheet, MeshCache) or sheet.mesh is not mesh or sheet.thickness != thickness:
-        raise ValueError(f"sheet: {sheet!r} is not of this mesh and thickness; give that of a scene like this, or none")
-    return sheet
+    if not isinstance(cache, MeshCache) or cache.mesh is not mesh or cache.thickness != thickness:
+        raise ValueError(f"cache: {cache!r} is not of this mesh and thickness; give that of a scene like this, or none")
+    return cache
 
 
 def scaled(case: LoadCase, scale: float) -> LoadCase:

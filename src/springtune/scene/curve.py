@@ -31,10 +31,10 @@ CurvePath = LinearPath | StablePath  # equilibrium path over force over stiffnes
 LEAST_RATIO = 1e-9  # least ratio of a stiffness; the largest is one over it [1]
 
 
-def follow(sheet: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray) -> CurvePath:
+def follow(cache: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray) -> CurvePath:
     """Equilibrium path of springs of one stiffness, as far as `loads` need it: force over stiffness [m], one sign."""
-    problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
-    return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
+    problem = cache.problem(kind, Springs(1.0, uniform(cache.mesh)))
+    return (LinearPath if kinematics == "linear" else StablePath)(problem, cache.measured(kind), loads)
 
 
 def meeting(path: CurvePath, force: float, stiffness: np.ndarray, reference: float, objection: str) -> Best:
@@ -169,7 +169,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         raise ValueError("stiffness_ratios: not all above zero; give stiffnesses over E t such as [0.5, 0.8, 1.1]")
     beam, kind, force = scene.beam, scene.kind, scene.force
     stiffness = ratios * scene.material.in_plane.young_modulus * beam.thickness
-    path = follow(scene.sheet, kind, scene.kinematics, force / stiffness)
+    path = follow(scene.cache, kind, scene.kinematics, force / stiffness)
     try:
         reference, objection = scene.reference_values()["displacement"], scene.objection
     except RuntimeError as error:

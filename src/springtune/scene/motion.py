@@ -13,20 +13,20 @@ from .mesh_cache import MeshCache
 
 
 def motion_of(
-    sheet: MeshCache, kind: LoadKind, springs: Springs, density: float, force: float = 0.0, **options: Any
+    cache: MeshCache, kind: LoadKind, springs: Springs, density: float, force: float = 0.0, **options: Any
 ) -> Motion:
     """Springs of a sheet with their masses under a force with its sign [N]; density in kg/m3."""
-    inertia = masses(sheet.mesh, density, sheet.thickness) / springs.reference
-    load = {} if "load" in options else {"load": force / springs.reference * sheet.pattern(kind, springs)}
-    return Motion(sheet.problem(kind, springs).network, inertia, **(load | options))
+    inertia = masses(cache.mesh, density, cache.thickness) / springs.reference
+    load = {} if "load" in options else {"load": force / springs.reference * cache.pattern(kind, springs)}
+    return Motion(cache.problem(kind, springs).network, inertia, **(load | options))
 
 
 def stable_steps(
-    sheet: MeshCache, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
+    cache: MeshCache, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
 ) -> dict[str, float] | str:
     """Largest stable steps [s] about rest, undamped, by integrator, or why not found; `inertia` is in kg."""
-    held = np.zeros(sheet.mesh.points.shape, dtype=bool) if held is None else held
-    motion = Motion(sheet.network(held, springs), inertia / springs.reference)
+    held = np.zeros(cache.mesh.points.shape, dtype=bool) if held is None else held
+    motion = Motion(cache.network(held, springs), inertia / springs.reference)
     try:
         return {name: motion.step_limit(name) for name in integrators}
     except ArpackError as error:

@@ -83,14 +83,14 @@ class MeshModuli:
     """Patch tests of many definitions on one mesh; networks that differ in reference stiffness alone once."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self.sheet = MeshCache(mesh, 1.0)
+        self.cache = MeshCache(mesh, 1.0)
         self._test = PatchTest(mesh)
         self._found: dict[tuple[object, ...], tuple[float, float, float]] = {}
 
     def __call__(self, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
         """Moduli of a definition, see `moduli`."""
-        springs, seconds = self.sheet.derive(definition, material)
-        origin = springs, seconds, self.sheet.mesh, material
+        springs, seconds = self.cache.derive(definition, material)
+        origin = springs, seconds, self.cache.mesh, material
         if not isinstance(material, Material):
             return Moduli(np.nan, np.nan, np.nan, *origin)
         name = springs.relative.tobytes(), springs.lateral, *(energy.key for energy in springs.energies)
@@ -98,7 +98,7 @@ class MeshModuli:
             self._found[name] = *self._test.axial(springs), self._test.shear(springs)
         young, poisson, shear = self._found[name]
         wanted = material.in_plane
-        scale = springs.reference / (wanted.young_modulus * self.sheet.thickness)
+        scale = springs.reference / (wanted.young_modulus * self.cache.thickness)
         return Moduli(young * scale - 1, poisson, shear * scale * 2 * (1 + wanted.poisson_ratio) - 1, *origin)
 
 

@@ -178,7 +178,7 @@ class Scene(Tabled):
         Uniform stiffness [N/m], or a text with its unit, for definitions that need one.
     scale : float, optional
         Factor on all that the load case of a shape prescribes, forces and displacements [1].
-    sheet : MeshCache, optional
+    cache : MeshCache, optional
         Of another scene of the same mesh and thickness, to compute once what the two share.
 
     Attributes
@@ -258,7 +258,7 @@ class Scene(Tabled):
         kinematics: str = "nonlinear",
         stiffness: float | str | None = None,
         scale: float = 1.0,
-        sheet: MeshCache | None = None,
+        cache: MeshCache | None = None,
     ) -> None:
         choose(dict.fromkeys(KINEMATICS), kinematics, "kinematics")
         self.kinematics = kinematics
@@ -266,16 +266,16 @@ class Scene(Tabled):
         if isinstance(beam, Shape):
             if force is not None:
                 raise ValueError(f"force: {force!r} is not used, since loads of a shape have their sizes; give scale")
-            about = self.boundary_problem = ShapeProblem(beam, mesh, material, load, scale, kinematics, sheet)
+            about = self.boundary_problem = ShapeProblem(beam, mesh, material, load, scale, kinematics, cache)
             self.shape, self.grouped, self.case, self.scale = beam, about.grouped, about.case, about.scale
             self.by_part = about.by_part
         else:
             if scale != 1:
                 raise ValueError(f"scale: {scale!r} is of loads of shapes alone; give another force")
-            of_beam = self.boundary_problem = BeamProblem(beam, mesh, material, load, force, kinematics, sheet)
+            of_beam = self.boundary_problem = BeamProblem(beam, mesh, material, load, force, kinematics, cache)
             self.beam, self.material, self.kind = beam, of_beam.material, of_beam.kind
             self.force, self.follower = of_beam.force, of_beam.follower
-        self.mesh, self.sheet, self.load = self.boundary_problem.mesh, self.boundary_problem.sheet, load
+        self.mesh, self.cache, self.load = self.boundary_problem.mesh, self.boundary_problem.cache, load
         self.definition = definition_of(definition)
         self.boundary_problem.check(self.definition)
         self.uniform_stiffness = given_stiffness(self.definition, stiffness)
@@ -335,12 +335,12 @@ class Scene(Tabled):
     @property
     def network(self) -> Network:
         """Network of the springs, held as the load holds them; everything over the reference stiffness."""
-        return self.sheet.network(self.held, self.springs)
+        return self.cache.network(self.held, self.springs)
 
     @property
     def problem(self) -> StaticProblem:
         """Network under the pattern of the load."""
-        return self.sheet.problem(self.boundary_problem.loading, self.springs)
+        return self.cache.problem(self.boundary_problem.loading, self.springs)
 
     def solve(self) -> "Result":
         """Solve the equilibrium under the force.

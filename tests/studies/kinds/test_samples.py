@@ -168,24 +168,24 @@ class TestOnce:
         box = (0.103, 0.0391, 0.01)
         answers = []
         for like in (None, before):
-            sheet = MeshCache(st.MESH_TYPES["structured"](*box), 1.0, like=like)
-            springs, _ = sheet.derive(name, st.Material(1.0, 0.3))
-            answers += [sheet.solve(kind, springs, 1e-4, how).displacement for how in ("linear", "nonlinear")]
+            cache = MeshCache(st.MESH_TYPES["structured"](*box), 1.0, like=like)
+            springs, _ = cache.derive(name, st.Material(1.0, 0.3))
+            answers += [cache.solve(kind, springs, 1e-4, how).displacement for how in ("linear", "nonlinear")]
         assert answers[:2] == answers[2:]
-        assert sheet.mesh.edges is before.mesh.edges
+        assert cache.mesh.edges is before.mesh.edges
 
     def test_sampled_scenes_are_those_of_a_sheet_each(self, linear):
         data = linear["samples"].to_dataset()
         for row in range(0, data.sizes["sample"], 7):
             one = data.isel(sample=row)
             box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
-            sheet = MeshCache(st.MESH_TYPES["structured"](*box), float(one.thickness))
+            cache = MeshCache(st.MESH_TYPES["structured"](*box), float(one.thickness))
             for load in ("traction", "compression"):
                 for name in ("lattice", "area"):
                     material = st.Material(float(one.young_modulus), float(one.poisson_ratio))
-                    springs, _ = sheet.derive(name, material)
+                    springs, _ = cache.derive(name, material)
                     force = st.LOADS[load].sign * float(one.force)
-                    wanted = sheet.solve(st.LOADS[load].kind, springs, force, "linear")
+                    wanted = cache.solve(st.LOADS[load].kind, springs, force, "linear")
                     found = one.sel(load=load, definition=name)
                     assert int(found.status) == wanted.status
                     assert float(found.displacement) == pytest.approx(wanted.displacement, rel=1e-9)
@@ -278,9 +278,9 @@ class TestRuns:
     def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
         one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
         box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
-        sheet = MeshCache(st.MESH_TYPES["structured"](*box), float(one.thickness))
-        springs, _ = sheet.derive("uniform", st.Material(float(one.best_stiffness) / float(one.thickness), 0.3))
-        found = sheet.solve(st.LOADS["traction"].kind, springs, float(one.force), "linear").displacement
+        cache = MeshCache(st.MESH_TYPES["structured"](*box), float(one.thickness))
+        springs, _ = cache.derive("uniform", st.Material(float(one.best_stiffness) / float(one.thickness), 0.3))
+        found = cache.solve(st.LOADS["traction"].kind, springs, float(one.force), "linear").displacement
         # Springs of k have sqrt(3)/2 E t = k at that E.
         assert found * np.sqrt(0.75) == pytest.approx(float(one.reference_displacement), rel=1e-9)
 

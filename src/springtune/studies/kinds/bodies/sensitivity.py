@@ -33,9 +33,9 @@ def failed(curve, why):
 
 def solve(curve, shared):
     """Result of a curve."""
-    begin, (sheet, folder) = time.perf_counter(), shared
+    begin, (cache, folder) = time.perf_counter(), shared
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
-    path = follow(sheet, LOAD_KINDS[curve["kind"]], curve["kinematics"], force / stiffness)
+    path = follow(cache, LOAD_KINDS[curve["kind"]], curve["kinematics"], force / stiffness)
     reference = any_reference.read(folder, curve["reference"])
     why, wanted = objection(reference, force, curve["kinematics"]), force * reference.get("displacement", np.nan)
     best = meeting(path, force, stiffness, wanted, why)

@@ -81,13 +81,13 @@ def solve(task, solve_one):
         return failed(task, f"{task['definition']}: {error}") | {"seconds": time.perf_counter() - begin}
 
 
-def _solve_problem(about, springs, seconds, task):
+def _solve_problem(problem, springs, seconds, task):
     """Equilibrium of a scene and its stored values, with arrays if the task keeps fields."""
     begin = time.perf_counter()
-    found = about.solve(springs)
+    found = problem.solve(springs)
     result = {"seconds": time.perf_counter() - begin, "definition_seconds": seconds}
     result |= {name: getattr(found, name) for name in ("status", "message", "negative_pivots")}
-    result |= {f"stiffness_{part}": value for part, value in about.sheet.typical_stiffness(springs).items()}
+    result |= {f"stiffness_{part}": value for part, value in problem.cache.typical_stiffness(springs).items()}
     result["further_energies"] = len(springs.energies)
     if task.get("keep_fields") and found.equilibrium.converged:
         moved = found.equilibrium.displacements
@@ -97,7 +97,7 @@ def _solve_problem(about, springs, seconds, task):
     return found, result
 
 
-def solve_beam(beam, sheet, field, task):
+def solve_beam(beam, cache, field, task):
     """Result of a scene of a beam; ``field`` returns a reference's displacements for 1 N at particles, or None."""
     stiffness, group = task.get("stiffness"), task.get("calibrated")
     if group:
@@ -107,11 +107,11 @@ def solve_beam(beam, sheet, field, task):
     wanted = field(task["reference"]) if "reference" in task else None
     kind, force, kinematics = LOAD_KINDS[task["kind"]], task["force"], task["kinematics"]
     definition, material = definition_of(task["definition"]), material_of(task["material"])
-    springs, seconds = sheet.derive(definition, material, stiffness, (kind, force, wanted))
+    springs, seconds = cache.derive(definition, material, stiffness, (kind, force, wanted))
     springs = replace(springs, reference=task.get("stiffness_scale", 1) * springs.reference)
     load = Load(kind, copysign(1, force), task["follower"])
-    about = BeamProblem(beam, sheet.mesh, material, load, abs(force), kinematics, sheet)
-    solution, result = _solve_problem(about, springs, seconds, task)
+    problem = BeamProblem(beam, cache.mesh, material, load, abs(force), kinematics, cache)
+    solution, result = _solve_problem(problem, springs, seconds, task)
     found = solution.equilibrium
     result |= {
         "iterations": found.iterations,
@@ -125,41 +125,41 @@ def solve_beam(beam, sheet, field, task):
     if wanted is not None and task.get("keep_fields"):
         result["reference_displacements"] = force * wanted
     if not found.converged:
-        return result | ({} if found.last is None else {"last_displacement": sheet.displacement(kind, found.last)})
+        return result | ({} if found.last is None else {"last_displacement": cache.displacement(kind, found.last)})
     result["displacement"] = solution.displacement
     if kind.pressed:
-        result |= _pressed_face(sheet, kind, found.displacements)
+        result |= _pressed_face(cache, kind, found.displacements)
     if wanted is not None:
-        result["field_error"] = field_error(sheet.mesh, found.displacements, force * wanted)
+        result["field_error"] = field_error(cache.mesh, found.displacements, force * wanted)
     return result
 
 
-def _pressed_face(sheet, kind, displacements):
+def _pressed_face(cache, kind, displacements):
     """Mean displacement of a pressed face and its profile, along the force [m]."""
-    weights = sheet.loading(kind).pattern
+    weights = cache.loading(kind).pattern
     face = np.flatnonzero(weights[:, kind.axis] > 0)
-    x, moved = sheet.mesh.points[face, kind.along], displacements[face, kind.axis]
+    x, moved = cache.mesh.points[face, kind.along], displacements[face, kind.axis]
     order = np.argsort(x)
     profile = np.interp(FACE_POSITIONS * np.ptp(x), x[order], moved[order])
     return {"face_mean": float((weights * displacements).sum()), "face_profile": profile}
 
 
-def solve_shape(described, grouped, sheets, task):
-    """Result of a scene of a shape; ``sheets`` caches the mesh by thickness."""
+def solve_shape(described, grouped, caches, task):
+    """Result of a scene of a shape; ``caches`` has those of the mesh by thickness."""
     from .task_values import LOAD_NAME, materials_of, shape_of, values_by_key  # here: most studies have no shapes
 
     shape = shape_of(described, task["thickness"], task["load"])
     case, materials, kinematics = shape.loads[LOAD_NAME], materials_of(task["materials"]), task["kinematics"]
-    definition, sheet = definition_of(task["definition"]), sheets.get(shape.thickness)
+    definition, cache = definition_of(task["definition"]), caches.get(shape.thickness)
     try:
         check_case(grouped, case)
-        about = ShapeProblem(shape, grouped, materials, LOAD_NAME, 1.0, kinematics, sheet)
-        about.check(definition)
-        sheets[shape.thickness] = about.sheet
+        problem = ShapeProblem(shape, grouped, materials, LOAD_NAME, 1.0, kinematics, cache)
+        problem.check(definition)
+        caches[shape.thickness] = problem.cache
         with naming_errors(definition):
-            springs, seconds = about.springs(definition, None)
-        solution, result = _solve_problem(about, springs, seconds, task)
+            springs, seconds = problem.springs(definition, None)
+        solution, result = _solve_problem(problem, springs, seconds, task)
     # Loads on what is held, quantities that the mesh has not, definitions that refuse it; mechanisms.
     except (ValueError, SingularError) as error:
         return failed(task, str(error))
-    return result | {"values": values_by_key(about.values(springs, solution), case)}
+    return result | {"values": values_by_key(problem.values(springs, solution), case)}
