@@ -336,10 +336,7 @@ def xml_comment(text: str) -> str:
     return re.sub("-(?=-)", "- ", printable(text))
 
 
-SHOWN_CHARACTERS = 60
-
-
-def clipped(text: str, longest: int = SHOWN_CHARACTERS) -> str:
+def clipped(text: str, longest: int = 60) -> str:
     """Return a text as `shown`, shortened for a message."""
     return shown(text if len(text) <= longest else f"{text[: longest - 3]}...")
 

@@ -11,10 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
 from functools import cache
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import pint
+from typing import Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +128,7 @@ def _article(dimension: str) -> str:
 
 
 @cache
-def _registry() -> "pint.UnitRegistry[float]":
+def _registry() -> Any:
     import pint  # here, since few studies need it
 
     return pint.UnitRegistry()

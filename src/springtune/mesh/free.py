@@ -121,8 +121,6 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
     known = {*lengths, *shape.points, *(one.inner for one in shape.rounds)} - {"", None}
     for name, value in {"": size, **refined}.items():
         where = f"refined {name!r}" if name else "mesh size"
-        if not value > 0:
-            raise MeshError(f"{where}: {value!r} is not a number above zero; give one in m")
         if name and name not in known:
             there = ", ".join(sorted(map(str, known))) or "none"
             raise MeshError(f"{where}: {what} has no side, point or part of that name; known: {there}")

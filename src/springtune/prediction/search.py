@@ -13,6 +13,7 @@ import numpy as np
 
 from ..mesh.cells import MESH_TYPES
 from ..mesh.free import mesh_shape
+from ..mesh.rows import ROW_HEIGHT
 from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text
 from ..problem.materials import AnyMaterial, Material
@@ -28,8 +29,6 @@ logger = logging.getLogger(__name__)
 
 FINEST_CELLS_RATIO, LEAST_FINER_MESHES = 2.0, 2
 """Cells across the finest mesh tried over those of the answer, and number of finer meshes tried, at least."""
-
-ROW_HEIGHT = math.sqrt(3) / 2  # height of an equilateral triangle, over its side
 
 EXTRAPOLATION_MARGIN = 1.5
 """Change still allowed to an error down to the finest mesh, over that of an error in proportion to the mesh size."""
