@@ -76,7 +76,7 @@ class LoadedBeam:
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
 
 
-class Clock(Counter):
+class Clock(Counter[str]):
     """Seconds of each part of a run."""
 
     @contextmanager
