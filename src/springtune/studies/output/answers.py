@@ -72,8 +72,8 @@ def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "mater
         size, answers = here.mesh_size[here.known].min(), []
         for name, own in here[here.mesh_size == size].groupby("definition"):
             inside, outline = (np.unique(own[f"stiffness_{place}"].dropna()) for place in ("inside", "outline"))
-            uniform = "stiffness" in own and own.stiffness.notna().any()
             energies = "further_energies" in own and bool(own.further_energies.max() > 0)
+            uniform = not energies and "stiffness" in own and bool(own.stiffness.notna().any())
             kind, ratio = (uniform, energies), own.ratio.median()
             if len(errors := own.valid_error[own.known].to_numpy()):
                 answers.append(Answer(labels, size, name, *kind, inside, outline, ratio, errors))
