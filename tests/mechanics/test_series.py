@@ -75,9 +75,7 @@ def random_curve(seed):
     sign, s = random.choice([-1, 1]), height * 10 ** random.uniform(-2, 0.3)
     if kind != AXIAL or sign < 0:
         small = 1e-6 * sign * height
-        critical = smallest_share(problem.network, None, small * problem.slope, problem.network.rest_factor) * abs(
-            small
-        )
+        critical = smallest_share(problem.network, None, small * problem.slope) * abs(small)
         s = critical * random.uniform(0.3, 1.8) if kind == AXIAL else min(0.3 * s, critical)
     return problem, measured(mesh, kind), sign * min(s, 2 * height) / RATIOS
 

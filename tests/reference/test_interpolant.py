@@ -108,12 +108,9 @@ def test_points_outside_are_refused():
 
 
 def test_what_cannot_be_certified_is_said():
-    box = BOXES[AXIAL]
-    says = "'axial' over aspect ratios 1 to 12 .*: more than 20 solves"
+    says = "'axial' over aspect ratios 1 to 12 .*: .* the last one, the tolerance is 5.0e-13"
     with pytest.raises(interpolant.NotCertifiedError, match=says):
-        Interpolant.build(AXIAL, *box, most=20)
-    with pytest.raises(interpolant.NotCertifiedError, match="the last one, the tolerance is 5.0e-13"):
-        Interpolant.build(AXIAL, *box, tolerance=1e-12)
+        Interpolant.build(AXIAL, *BOXES[AXIAL], tolerance=1e-12)
 
 
 def test_a_rough_answer_is_not_certified():

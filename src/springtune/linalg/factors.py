@@ -221,13 +221,11 @@ class PinnedFactor:
 
 def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np.ndarray]) -> PinnedFactor | None:
     """Factorize an indefinite matrix with a full diagonal and ascending rows; None if no choice of pins helps."""
-    columns = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    diagonal = np.flatnonzero(matrix.indices == columns)
-    stiffness = PIN * float(np.abs(matrix.data[diagonal]).max())
+    stiffness = PIN * float(np.abs(matrix.diagonal()).max())
     for pins in choices:
-        data = matrix.data.copy()
-        data[diagonal[pins]] += stiffness
-        factor = analysis.factorize(data)
+        pinned = matrix.copy()
+        pinned[pins, pins] = matrix.diagonal()[pins] + stiffness
+        factor = analysis.factorize(pinned.data)
         if factor is not None:
             found = PinnedFactor(matrix, factor, pins, stiffness)
             return found if found.certain else None

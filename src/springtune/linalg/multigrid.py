@@ -83,14 +83,13 @@ class Multigrid:
         self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
         self._held, self._places, self._product = held, np.flatnonzero(~held), chunked(matrix)
         self.name = "multigrid"
-        self._levels: list[_Level]
-        self._coarsest: Any
         self._direct: Factor | None = None
         self._certain = False
-        if like is None or like._coarsest is None:
+        self._levels: list[_Level] = like._levels if like else []
+        self._coarsest: Any = like._coarsest if like else None
+        self._borrowed = self._coarsest is not None
+        if not self._borrowed:
             self._lay_grids()
-        else:
-            self._borrowed, self._levels, self._coarsest = True, like._levels, like._coarsest
 
     def _lay_grids(self) -> None:
         """Levels, and unknowns and dense factor of the coarsest one; neither if the matrix is not positive definite."""
@@ -171,7 +170,10 @@ class Multigrid:
             return solution
         proves = not self._certain and tolerance <= CERTAIN
         if proves:
-            self._check_particles()
+            xx, xy, yy = self._matrix.diagonal.T
+            product = np.where(self._held[:, 0], 1.0, xx) * np.where(self._held[:, 1], 1.0, yy)
+            if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
+                raise SingularError("a particle is free to move: its springs, if any, are in one line")
         if self._coarsest is None:
             raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
         scale, forces = 1.0 / size, np.zeros(missing.shape)
@@ -199,13 +201,6 @@ class Multigrid:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
             length = weight * size * size / stiffness
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
-
-    def _check_particles(self) -> None:
-        """Refuse a matrix with a particle that moves without stiffness: all its springs are in one line."""
-        xx, xy, yy = self._matrix.diagonal.T
-        product = np.where(self._held[:, 0], 1.0, xx) * np.where(self._held[:, 1], 1.0, yy)
-        if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
-            raise SingularError("a particle is free to move: its springs, if any, are in one line")
 
     step = partialmethod(solve, tolerance=STEP_RESIDUAL)  # as accurate as a step of Newton's method needs
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..linalg.factors import Factor, SingularError
+from ..linalg.factors import SingularError
 from .network import Network
 from .newton import TOLERANCE, LoadedNetwork, norm
 
@@ -192,12 +192,9 @@ def follow(
             break
         growth = 1.5 if point.steps <= FEW_STEPS else 0.5 if point.steps > MANY_STEPS else 1.0
         length = min(growth * length, increment)
-    return Path(
-        np.array([point.load for point in points]),
-        np.array([problem.moved(point.load, network.expand(point.u)) for point in points]),
-        np.array([point.negative_pivots for point in points]),
-        message,
-    )
+    moved = np.array([problem.moved(point.load, network.expand(point.u)) for point in points])
+    _, loads, pivots, _ = map(np.array, zip(*points))
+    return Path(loads, moved, pivots, message)
 
 
 class Buckling(NamedTuple):
@@ -219,7 +216,7 @@ def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
     for share in (1.0, 0.1):  # a first estimate, then of its own size, whatever the guess
         step = share * at_rest
         there, back = step * problem.slope, -step * problem.slope
-        at_rest = smallest_share(network, None, there, network.rest_factor, back) * step
+        at_rest = smallest_share(network, None, there, back) * step
         if not abs(at_rest) < 100 * abs(guess):
             return Buckling(np.nan, "no buckling load up to a hundred times the load")
     first, second = (problem.newton(share * at_rest, share * at_rest * problem.slope) for share in (0.85, 0.95))
@@ -253,19 +250,15 @@ def _bifurcates(problem: LoadedNetwork, load: float, displacements: np.ndarray, 
 
 
 def smallest_share(
-    network: Network,
-    first: np.ndarray | None,
-    second: np.ndarray | None,
-    factor: Factor | None = None,
-    mirror: np.ndarray | None = None,
+    network: Network, first: np.ndarray | None, second: np.ndarray, mirror: np.ndarray | None = None
 ) -> float:
     """Return where on the line from one tangent (0) to another (1) the first eigenvalue vanishes.
 
-    One over the largest eigenvalue of ``(K1 - K2) v = mu K1 v``. Displacements [m] are None at rest.
+    One over the largest eigenvalue of ``(K1 - K2) v = mu K1 v``. The `first` displacements [m] are None at rest.
     """
     here, there = network.tangent(first), network.tangent(second)
     change = here - there if mirror is None else 0.5 * (network.tangent(mirror) - there)
-    factor = factor or network.factorize_tangent(first)
+    factor = network.rest_factor if first is None else network.factorize_tangent(first)
     inverse = LinearOperator(here.shape, factor.solve, dtype=float)
     # A fixed start, across the beam, since buckling bends it: the same numbers in every run.
     start = network.reduce(network.mesh.points[:, ::-1] ** 2 * [0.0, 1.0] + 1e-3 * network.mesh.points)

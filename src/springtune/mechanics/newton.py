@@ -306,12 +306,12 @@ def _signs(count: int) -> np.ndarray:
     return np.random.default_rng(0).choice([-1.0, 1.0], count)
 
 
+_Balance = Callable[[np.ndarray], tuple[np.ndarray, float]]
+"""Load that is missing at displacements, and its norm over the load's, see `LoadedNetwork.balance`."""
+
+
 def refine(
-    network: Network,
-    here: Iterate,
-    factor: Factor,
-    balance: Callable[[np.ndarray], tuple[np.ndarray, float]],
-    linear: bool = False,
+    network: Network, here: Iterate, factor: Factor, balance: _Balance, linear: bool = False
 ) -> tuple[Iterate, float]:
     """Take steps with one tangent while each halves the estimated error; return the iterate and that error [1]."""
     error = error_estimate(network, factor, here, linear)

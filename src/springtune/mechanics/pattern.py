@@ -36,16 +36,6 @@ class Pattern:
         number[self.places] = np.arange(self.size)
         self.number = number.reshape(-1, 2)
 
-    @property
-    def indices(self) -> np.ndarray:
-        """Rows of the entries, shape (n_entries,)."""
-        return self._sparsity[0]
-
-    @property
-    def pointers(self) -> np.ndarray:
-        """Pointers of the columns, shape (size + 1,)."""
-        return self._sparsity[1]
-
     @cached_property
     def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rows, column pointers, and each entry's place in the sums of `coupling_entries`."""
@@ -85,7 +75,7 @@ class Pattern:
     @cached_property
     def codes(self) -> np.ndarray:
         """One number for the place of each entry, ascending."""
-        return np.repeat(np.arange(self.size), np.diff(self.pointers)) * self.size + self.indices
+        return np.repeat(np.arange(self.size), np.diff(self._empty.indptr)) * self.size + self._empty.indices
 
     @cached_property
     def order(self) -> np.ndarray:
@@ -96,7 +86,8 @@ class Pattern:
     @cached_property
     def analysis(self) -> Analysis:
         """Symbolic Cholesky factorization; in CHOLMOD's own order for meshes too small for nested dissection."""
-        return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTION_FROM_UNKNOWNS else None)
+        order = self.order if self.size > DISSECTION_FROM_UNKNOWNS else None
+        return Analysis(self._empty.indices, self._empty.indptr, order)
 
     @cached_property
     def pins(self) -> list[np.ndarray]:
@@ -107,14 +98,14 @@ class Pattern:
     @cached_property
     def elimination(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Unknowns in the order of elimination; place and row of each entry in that order, and column pointers."""
-        order = self.order
+        order, sparsity = self.order, self._empty
         rank = np.empty(self.size, dtype=np.int64)
         rank[order] = np.arange(self.size)
-        sizes = np.diff(self.pointers)[order]
+        sizes = np.diff(sparsity.indptr)[order]
         pointers = np.concatenate([[0], np.cumsum(sizes)])
-        places = np.repeat(self.pointers[order] - pointers[:-1], sizes) + np.arange(pointers[-1])
+        places = np.repeat(sparsity.indptr[order] - pointers[:-1], sizes) + np.arange(pointers[-1])
         # The library sorts rows within columns several times faster than numpy does all entries.
-        numbered = csc_array((places.astype(float), rank[self.indices[places]], pointers), shape=(self.size, self.size))
+        numbered = csc_array((places.astype(float), rank[sparsity.indices[places]], pointers), shape=sparsity.shape)
         numbered.sort_indices()
         indices, pointers = numbered.indices.astype(np.int32), pointers.astype(np.int32)
         return order, numbered.data.astype(np.int64), indices, pointers
@@ -211,7 +202,7 @@ class Pattern:
         rows, columns = entry_places(self.number[particles])
         kept = np.flatnonzero((rows >= 0) & (columns >= 0))
         places = np.searchsorted(self.codes, columns[kept] * self.size + rows[kept])
-        return np.bincount(places, matrices.ravel()[kept], len(self.indices))
+        return np.bincount(places, matrices.ravel()[kept], len(self._empty.indices))
 
     def loose_entries(self, particles: np.ndarray, matrices: np.ndarray) -> csr_array:
         """Matrix over all directions (2 n_points, 2 n_points) of groups of particles, without those that are held."""
@@ -228,4 +219,5 @@ class Pattern:
 
     @cached_property
     def _empty(self) -> csc_array:
-        return csc_array((np.zeros(len(self.indices)), self.indices, self.pointers), shape=(self.size, self.size))
+        indices, pointers, _ = self._sparsity
+        return csc_array((np.zeros(len(indices)), indices, pointers), shape=(self.size, self.size))

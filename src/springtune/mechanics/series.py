@@ -1,5 +1,6 @@
 """Sensitivity curves: the displacement under many loads ``s = F / k`` from one equilibrium path, by power series."""
 
+from bisect import bisect_left
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -71,7 +72,7 @@ class StablePath:
         self.stable_to, self._unstable_from, self.end = 0.0, np.inf, ""
         values, good, count = self._by_series(loads)
         stable = np.zeros(len(loads), dtype=bool)
-        stable[: self._count_stable(loads[:count])] = True
+        stable[: bisect_left(loads[:count], True, key=lambda s: not self._is_stable(abs(s)))] = True
         self._check_between(loads, values, stable)
         found = stable.copy()
         found[:count] = True
@@ -193,17 +194,6 @@ class StablePath:
             else:
                 self._unstable_from = load
         return load <= self.stable_to
-
-    def _count_stable(self, loads: np.ndarray) -> int:
-        """Count the loads on the stable path, by bisection."""
-        least, most = 0, len(loads)
-        while least < most:
-            middle = (least + most + 1) // 2
-            if self._is_stable(abs(loads[middle - 1])):
-                least = middle
-            else:
-                most = middle - 1
-        return least
 
     def _check_between(self, loads: np.ndarray, values: np.ndarray, stable: np.ndarray) -> None:
         """Correct values off their neighbours' trend: an approximant may have a pole next to a zero."""

@@ -404,17 +404,10 @@ class StaticProblem(LoadedNetwork):
                 step <= SHORTEST_STEP or not np.isnan(limit) or not found.converged and step <= SMALLEST_STEP
             ):
                 reason = "cells turn inside out" if inverts else found.reason or "no stable path"
-                return replace(
-                    found,
-                    converged=False,
-                    iterations=iterations,
-                    reason=f"{reason} beyond {100 * done:.3g} % of the load",
-                    unstable_share=unstable,
-                    load_share=done,
-                    last=last,
-                    limit_share=limit / s,
-                    snapped=not np.isnan(limit) and self._snaps(s, direct, here, last, before),
-                )
+                reason += f" beyond {100 * done:.3g} % of the load"
+                snapped = not np.isnan(limit) and self._snaps(s, direct, here, last, before)
+                found = replace(found, converged=False, iterations=iterations, reason=reason, unstable_share=unstable)
+                return replace(found, load_share=done, last=last, limit_share=limit / s, snapped=snapped)
             else:
                 step *= 0.5
 

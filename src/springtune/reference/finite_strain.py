@@ -442,9 +442,7 @@ class NeoHooke(PlaneLaw):
     """Compressible neo-Hookean energy of a sheet with E = 1; `nu` < 0.5 is Poisson's ratio at small strain."""
 
     def __init__(self, nu: float, plane: str) -> None:
-        self.shear = 1 / (2 * (1 + nu))
-        self.bulk = 1 / (3 * (1 - 2 * nu))
-        self.plane = plane
+        self.shear, self.bulk, self.plane = 1 / (2 * (1 + nu)), 1 / (3 * (1 - 2 * nu)), plane
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """Derivatives of the module's energy; in plane stress the stretch z across is eliminated."""

@@ -6,7 +6,7 @@ interpolated; coefficients and error fall geometrically (Trefethen, Approximatio
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
@@ -80,13 +80,12 @@ class Interpolant:
         aspect_range: tuple[float, float],
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
-        most: int | None = None,
         solve: Callable[..., "ReferenceSolution"] | None = None,
     ) -> Self:
         """Build an interpolant over a box of aspect ratios and Poisson's ratios, with as many solves as it needs."""
         from .small_strain import solve_unit  # here: who reads an interpolant does without scipy
 
-        box = _Box(kind, aspect_range, nu_range, tolerance, most, solve or solve_unit)
+        box = _Box(kind, aspect_range, nu_range, tolerance, solve or solve_unit)
         values, error_estimate = box.certified()
         return cls(kind, aspect_range, nu_range, values, error_estimate, len(box.solved))
 
@@ -126,43 +125,38 @@ class _Box:
     aspect_range: tuple[float, float]
     nu_range: tuple[float, float]
     tolerance: float
-    most: int | None
     solver: Callable[..., "ReferenceSolution"]
-
-    def __post_init__(self) -> None:
-        #: Answers in the order of `ANSWER_NAMES`, and error estimates, by place in the box (-1 to 1 on each axis).
-        self.solved: dict[tuple[float, float], tuple[np.ndarray, float]] = {}
-        self.counts = [3 if last > first else 1 for first, last in (self.aspect_range, self.nu_range)]
+    #: Answers in the order of `ANSWER_NAMES`, and error estimates, by place in the box (-1 to 1 on each axis).
+    solved: dict[tuple[float, float], tuple[np.ndarray, float]] = field(default_factory=dict)
 
     def certified(self) -> tuple[np.ndarray, float]:
         """Values at the nodes and the error estimate."""
-        checks = self._checks()
+        wide = [last > first for first, last in (self.aspect_range, self.nu_range)]
+        checks, counts = self._checks(*wide), [3 if along else 1 for along in wide]
         while True:
-            places = [chebyshev_points(count) for count in self.counts]
+            places = [chebyshev_points(count) for count in counts]
             answers, estimate = self._solve([(along, across) for along in places[0] for across in places[1]])
-            values = _interpolated_values(answers).reshape(4, *self.counts)
+            values = _interpolated_values(answers).reshape(4, *counts)
             promised = [_expected_error(np.moveaxis(values[:2], axis, 1)) for axis in (1, 2)]
             goal = (1 - NODE_SHARE) * self.tolerance / SAFETY_FACTOR
             if max(promised) <= goal:
                 error_estimate = self._error_at_checks(values, checks, estimate)
                 if error_estimate <= self.tolerance:
                     return values, error_estimate
-            wide = [count > 1 for count in self.counts]
             axis = max(range(2), key=lambda axis: (wide[axis], promised[axis]))
-            self.counts[axis] = 2 * self.counts[axis] - 1
-            if not wide[axis] or self.counts[axis] > MOST_NODES:
+            counts[axis] = 2 * counts[axis] - 1
+            if not wide[axis] or counts[axis] > MOST_NODES:
                 found = max(promised) if max(promised) > goal else error_estimate
                 raise self._failure(f"error estimate {found:.1e} with {len(answers)} nodes")
 
-    def _checks(self) -> list[tuple[float, float]]:
+    def _checks(self, wide: bool, high: bool) -> list[tuple[float, float]]:
         """Points inside the box and on its edges; of a box without a width along an axis, in the middle of it."""
         random = np.random.default_rng(CHECKS_SEED)
         inside, edges = random.uniform(-1, 1, (CHECKS_INSIDE, 2)), random.uniform(-1, 1, (4, CHECKS_ON_EDGE))
         points = [(along, across) for along, across in inside]
         points += [(end, at) for end, edge in zip((-1.0, 1.0), edges[:2]) for at in edge]
         points += [(at, end) for end, edge in zip((-1.0, 1.0), edges[2:]) for at in edge]
-        along, across = (float(count > 1) for count in self.counts)
-        return list(dict.fromkeys((float(one[0]) * along, float(one[1]) * across) for one in points))
+        return list(dict.fromkeys((float(one[0]) * wide, float(one[1]) * high) for one in points))
 
     def _solve(self, places: list[tuple[float, float]]) -> tuple[np.ndarray, float]:
         """Answers, shape (n_places, 4), and the largest error estimate of them; what was solved is known."""
@@ -171,8 +165,6 @@ class _Box:
         # Elements are shared by those of one aspect ratio, which follow each other.
         for along, across in places:
             if (along, across) not in self.solved:
-                if self.most is not None and len(self.solved) >= self.most:
-                    raise self._failure(f"more than {self.most} solves are needed")
                 aspect = float(np.exp(_value_at_place(along, np.log(self.aspect_range))))
                 nu = float(np.clip(_value_at_place(across, self.nu_range), *self.nu_range))
                 try:

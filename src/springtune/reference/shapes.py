@@ -7,7 +7,7 @@ import numpy as np
 from scipy import spatial
 from scipy.sparse import coo_array
 
-from ..linalg.factors import SingularError, factorize
+from ..linalg.factors import SingularError, entry_places, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.sheets import GroupedMesh, check_held
 from ..mesh.sides import in_words
@@ -140,21 +140,12 @@ def solve_shape(
                 at = f"{estimates[name]:.1e} at degree {degree} ({level.unknowns} unknowns)"
                 complaint = f"{problem.shown(name)}: relative error estimate {at}, {why}{problem.reason(name)}"
         if not complaint:
-            rotation, strain = level.rotation_and_strain()
-            found = {name: values[-1][name] for name in names}
-            least = {name: NEGLIGIBLE_SHARE * level.scale(problem.kinds[name]) for name in names}
-            return ShapeReference(
-                {name: one if abs(one) > ZERO_BOUND_FACTOR * bounds[name] else 0.0 for name, one in found.items()},
-                {name: estimates[name] for name in names},
-                energy=values[-1][""],
-                rotation=rotation,
-                strain=strain,
-                unknowns=level.unknowns,
-                note=level.note,
-                negligible=tuple(name for name, one in found.items() if abs(one) < least[name]),
-                _level=level,
-                _kinds=problem.kinds,
-            )
+            last_values, kinds, errors = values[-1], problem.kinds, {name: estimates[name] for name in names}
+            size = {name: abs(last_values[name]) for name in names}
+            told = {name: last_values[name] if size[name] > ZERO_BOUND_FACTOR * bounds[name] else 0.0 for name in names}
+            little = tuple(name for name in names if size[name] < NEGLIGIBLE_SHARE * level.scale(kinds[name]))
+            limits = *level.rotation_and_strain(), level.unknowns
+            return ShapeReference(told, errors, last_values[""], *limits, level, kinds, little, level.note)
     raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
 
 
@@ -488,12 +479,11 @@ class Level:
         right_side -= np.bincount(rows.ravel(), known, 2 * space.n_outer)
         free_outer = free[: 2 * space.n_outer]
         order = np.cumsum(free_outer) - 1
-        keep = (free_outer[rows][:, :, None] & free_outer[rows][:, None, :]).ravel()
-        i = np.broadcast_to(rows[:, :, None], reduced.shape).ravel()[keep]
-        j = np.broadcast_to(rows[:, None, :], reduced.shape).ravel()[keep]
+        i, j = entry_places(rows)
+        keep = free_outer[i] & free_outer[j]
         size = int(free_outer.sum())
         if size:
-            matrix = coo_array((reduced.ravel()[keep], (order[i], order[j])), shape=(size, size)).tocsc()
+            matrix = coo_array((reduced.ravel()[keep], (order[i[keep]], order[j[keep]])), shape=(size, size)).tocsc()
             try:
                 factor = factorize(matrix)
             except SingularError as error:

@@ -107,18 +107,8 @@ def solve_unit(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float 
     """Solve a beam of height 2 with E = 1 under traction 1, see `springtune.reference.answers`."""
     level, estimate = _converge(aspect_ratio, nu, kind, tolerance)
     x, y, field = level.field()
-    rotation, strain = rotation_and_strain(x, y, field)
-    return ReferenceSolution(
-        displacement=level.measured,
-        mean_displacement=level.displacement,
-        error_estimate=estimate,
-        x=x,
-        y=y + 1.0,
-        displacements=field,
-        rotation=rotation,
-        strain=strain,
-        unknowns=level.unknowns,
-    )
+    limits = rotation_and_strain(x, y, field)
+    return ReferenceSolution(level.measured, level.displacement, estimate, x, y + 1.0, field, *limits, level.unknowns)
 
 
 def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) -> tuple["UnitLevel", float]:
@@ -237,7 +227,7 @@ class _Grid:
         parts[self._kind.axis][:] = part
         return np.concatenate(parts)
 
-    def _matrices(self) -> tuple[csc_array, csc_array, csc_array]:
+    def _matrices(self) -> tuple[csc_array, ...]:
         """Parts of the stiffness matrix: direct strains, lateral contraction, shear."""
         (first, second), x, y = self._unknowns, self._x, self._y
 
@@ -246,13 +236,10 @@ class _Grid:
             return kron(*(coo_array(of[np.ix_(*ends)]) for of, *ends in zip((of_x, of_y), rows, columns)))
 
         lateral, turning = product(x.mixed, y.mixed.T, first, second), product(x.mixed.T, y.mixed, first, second)
-        direct = [product(x.slope, y.mass, first, first), product(x.mass, y.slope, second, second)]
-        shear = [product(x.mass, y.slope, first, first), product(x.slope, y.mass, second, second)]
-        return (
-            block_array([[direct[0], None], [None, direct[1]]], format="csc"),
-            block_array([[None, lateral], [lateral.T, None]], format="csc"),
-            block_array([[shear[0], turning], [turning.T, shear[1]]], format="csc"),
-        )
+        along, across = product(x.slope, y.mass, first, first), product(x.mass, y.slope, second, second)
+        of_first, of_second = product(x.mass, y.slope, first, first), product(x.slope, y.mass, second, second)
+        direct, shear = [[along, None], [None, across]], [[of_first, turning], [turning.T, of_second]]
+        return tuple(block_array(one, format="csc") for one in (direct, [[None, lateral], [lateral.T, None]], shear))
 
     def solve(self, nu: float) -> tuple[np.ndarray, float, float | None, float]:
         """Unknowns for a Poisson's ratio, energy, displacement of a pressed side's middle if any, rounding."""

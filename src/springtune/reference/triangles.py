@@ -555,10 +555,8 @@ class Space:
 
 def inverse_of(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
     """Inverses of 2 x 2 matrices, shape (..., 2, 2)."""
-    inverse = np.empty_like(matrices)
-    inverse[..., 0, 0], inverse[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
-    inverse[..., 0, 1], inverse[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
-    return inverse / determinants[..., None, None]
+    turned = np.swapaxes(matrices[..., ::-1, ::-1], -1, -2)
+    return turned * [[1, -1], [-1, 1]] / determinants[..., None, None]
 
 
 def is_unfolded(mesh: CoarseMesh) -> bool:

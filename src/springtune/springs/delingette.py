@@ -55,12 +55,9 @@ def _springs(mesh: Mesh, material: AnyMaterial, thickness: float, coupled: bool)
     else:
         stiffness, coupling = _anisotropic(mesh, material)
     squares = mesh.edge_lengths[mesh.cell_edges[3]] ** 2
-    return Springs(
-        membrane_stiffness(material, thickness),
-        np.zeros(len(mesh.edges)),
-        (BiquadraticEnergy(mesh.points, mesh.triangles, stiffness, coupling if coupled else None),),
-        linear_springs=mesh.sum_to_edges({3: 2 * squares * stiffness}),
-    )
+    energy = BiquadraticEnergy(mesh.points, mesh.triangles, stiffness, coupling if coupled else None)
+    reference, linear = membrane_stiffness(material, thickness), mesh.sum_to_edges({3: 2 * squares * stiffness})
+    return Springs(reference, np.zeros(len(mesh.edges)), (energy,), linear_springs=linear)
 
 
 def _isotropic(mesh: Mesh, material: Material) -> tuple[np.ndarray, np.ndarray]:

@@ -46,8 +46,7 @@ def _element_matrices(here: np.ndarray, elasticity: np.ndarray) -> np.ndarray:
     for xi, eta in signs / np.sqrt(3):
         local = 0.25 * np.stack([signs[:, 0] * (1 + eta * signs[:, 1]), signs[:, 1] * (1 + xi * signs[:, 0])], axis=1)
         jacobian = np.einsum("ia,nib->nab", local, here)
-        slopes = np.einsum("nba,ia->nib", np.linalg.inv(jacobian), local)
-        strain = _strain(slopes)
+        strain = _strain(np.einsum("nba,ia->nib", np.linalg.inv(jacobian), local))
         total = total + np.einsum("n,nki,kl,nlj->nij", np.linalg.det(jacobian), strain, elasticity, strain)
     return total
 
@@ -87,10 +86,9 @@ def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     for size in range(pairs, 0, -1):
         for chosen in combinations(range(pairs), size):
             places = np.array(chosen)
-            found = np.linalg.solve(
-                products[open_cells][:, places[:, None], places], wanted[open_cells][:, places, None]
-            )[..., 0]
-            trial = -(found * wanted[open_cells][:, places]).sum(axis=1)
+            matrices, aims = products[open_cells][:, places[:, None], places], wanted[open_cells][:, places]
+            found = np.linalg.solve(matrices, aims[..., None])[..., 0]
+            trial = -(found * aims).sum(axis=1)
             better = (found >= 0).all(axis=1) & (trial < cost[open_cells])
             where = open_cells[better]
             cost[where] = trial[better]

@@ -45,8 +45,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
         rectangles_only(mesh)
         ends = ((0, 1), (1, 2), (0, 2), (1, 3))
         vectors = np.stack([mesh.points[mesh.quads[:, j]] - mesh.points[mesh.quads[:, i]] for i, j in ends], axis=1)
-        found = _fitted(vectors, signed_areas(mesh.points, mesh.quads), compliance)
-        first, second, diagonal, other = found.T
+        first, second, diagonal, other = _fitted(vectors, signed_areas(mesh.points, mesh.quads), compliance).T
         parts[4] = np.stack([first / 2, second / 2, first / 2, second / 2, diagonal, other], axis=1)
     return Springs(reference * thickness, mesh.sum_to_edges(parts))
 
@@ -57,5 +56,4 @@ def _fitted(vectors: np.ndarray, areas: np.ndarray, compliance: np.ndarray) -> n
     x, y = (vectors / np.sqrt(squares)[..., None]).transpose(2, 0, 1)
     strains = np.stack([x * x, y * y, x * y], axis=2)
     products = strains @ compliance @ strains.transpose(0, 2, 1)
-    places = np.arange(vectors.shape[1])
-    return least_squares(products**2, products[:, places, places]) * areas[:, None] / squares
+    return least_squares(products**2, np.diagonal(products, axis1=1, axis2=2)) * areas[:, None] / squares

@@ -61,10 +61,8 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
     for stress, given in zip(([[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 1], [1, 0]]), gradients):
         forces = modulus * thickness * outline_forces(mesh, np.array(stress, dtype=float))
         gradient = np.array(given, dtype=float)
-        lifted = gradient[1] @ points[other]
-        if lifted:  # turned back, since it is held there
-            turn = lifted / points[other, 0]
-            gradient = gradient - turn * np.array([[0.0, -1.0], [1.0, 0.0]])
+        turn = gradient[1] @ points[other] / points[other, 0]  # turned back, since it is held there
+        gradient -= turn * np.array([[0.0, -1.0], [1.0, 0.0]])
         cases.append(Case(held, forces, points @ gradient.T))
     return cases
 

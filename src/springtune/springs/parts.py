@@ -80,13 +80,9 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
     if uniform:
         relative, linear = relative / owners, linear / owners
     lawful = any(springs.linear_springs is not None for springs, _, _ in found)
-    return Springs(
-        reference,
-        relative,
-        tuple(_joined(mesh, parts) for parts in energies.values()),
-        evaluations=sum(springs.evaluations for springs, _, _ in found),
-        linear_springs=linear if lawful else None,
-    )
+    together = tuple(_joined(mesh, parts) for parts in energies.values())
+    evaluations = sum(springs.evaluations for springs, _, _ in found)
+    return Springs(reference, relative, together, evaluations=evaluations, linear_springs=linear if lawful else None)
 
 
 def _law(energy: Any) -> tuple[object, ...]:
