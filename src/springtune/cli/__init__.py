@@ -133,8 +133,7 @@ class Commands(click.Group):
             lines = error.args if all(isinstance(one, str) for one in error.args) else (str(error),)
             command = self.get_command(ctx, ctx.invoked_subcommand or "")
             said = "\n".join(shown(name_option(line, command)) for line in lines)
-            wrong = said.startswith("--")
-            raise (WrongCall if wrong else click.ClickException)(said) from None
+            raise (WrongCall if said.startswith("--") else click.ClickException)(said) from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands."""

@@ -138,9 +138,8 @@ def _answer_for_mesh(body: options.BodyOptions, under: dict[str, Any], springs_a
     from ..prediction.choices import SOLVED_PARTICLES, predict, references, shape_references
     from .recommendation import prediction_text, recommended
 
-    known: Any = (
-        references(body.body, body.material, **under) if body.is_beam else shape_references(_shape_problem(body))
-    )
+    problem = None if body.is_beam else _shape_problem(body)
+    known: Any = shape_references(problem) if problem else references(body.body, body.material, **under)
     mesh = body.mesh if body.is_beam else body.mesh.mesh
     if len(mesh.points) > SOLVED_PARTICLES:
         why = f"has {len(mesh.points)} particles, more than the {SOLVED_PARTICLES} that are solved here"

@@ -201,8 +201,8 @@ def fit_text(fit: "EngineFit", mesh_name: str, tried: Sequence[str] = ()) -> str
             where = f"under {fit.scene.load}, but not under {', '.join(off)}"
             lines.append(f"The solver has not converged; the factor makes up for it {where}.")
     if fit.needed:
-        lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
-        lines.append(aligned(fit.needed.table(), left=2))
+        what = f"under {fit.scene.load}, solver error below 1 % without a factor:"
+        lines += ["", what, aligned(fit.needed.table(), left=2)]
     lines += ["", f"Tried: {', '.join(tried)}."] if tried else []
     return "\n".join([*lines, "", *_to_type(fit, bool(off))])
 

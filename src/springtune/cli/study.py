@@ -283,8 +283,7 @@ def _unlock(studies: "list[Study]", options: list[str]) -> None:
     """Remove the lock of a killed run; refuse a study under computation, a read-only folder and a full disk."""
     from ..studies.runs import locks
 
-    here = Path.cwd()
-    state = Path(".snakemake")
+    here, state = Path.cwd(), Path(".snakemake")
     if not os.access(state if state.exists() else here, os.W_OK):
         remedy = "`springtune info` and `browse` write nothing: call these"
         raise click.ClickException(f"{here} cannot be written; {remedy}")

@@ -293,8 +293,7 @@ class Output:
     @property
     def module(self) -> str:
         """Module that draws the figures."""
-        own = self.draw.__module__.partition(".")[2] if self.draw else ""
-        return own or self.plot.partition(":")[0]
+        return self.draw.__module__.partition(".")[2] if self.draw else self.plot.partition(":")[0]
 
 
 @dataclass(frozen=True)

@@ -62,10 +62,6 @@ MATERIAL_FORMS = (
 """Keys of the four forms of a material; a material has the keys of one form."""
 
 
-def _one_form(schema: dict[str, Any]) -> None:
-    schema["oneOf"] = [{"required": list(form)} for form in MATERIAL_FORMS]
-
-
 class MaterialConfig(Section):
     """A material, in one of four forms.
 
@@ -74,7 +70,7 @@ class MaterialConfig(Section):
     is fitted; in small strain it has its initial modulus and nu = 0.5. Beams need an isotropic material or rubber.
     """
 
-    model_config = ConfigDict(json_schema_extra=_one_form)
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [*form]} for form in MATERIAL_FORMS]})
 
     young_modulus: fields.Stress | None = None
     """Young's modulus E."""

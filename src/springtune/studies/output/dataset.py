@@ -166,10 +166,9 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
             unfinished.write_bytes(content.getbuffer())
     except OSError as error:
         free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
-        raise OSError(
-            f"{path}: cannot be written ({error.strerror}; {free:.0f} MB are free there); make room, or see to "
-            "permissions and limits, and run the study again: what is solved is stored, and only this file is made anew"
-        ) from None
+        why = f"cannot be written ({error.strerror}; {free:.0f} MB are free there)"
+        remedy = "make room, or see to permissions and limits, and run the study again: what is solved is stored"
+        raise OSError(f"{path}: {why}; {remedy}, and only this file is made anew") from None
 
 
 def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashable, int]) -> None:

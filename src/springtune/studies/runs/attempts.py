@@ -99,11 +99,10 @@ class Attempts:
         except DamagedError:
             raise
         except Exception as error:
-            why = failure_reason(error)
-            if not why:
-                self.broken.append(error)
-                return None
-            return failed(why)
+            if why := failure_reason(error):
+                return failed(why)
+            self.broken.append(error)
+            return None
         finally:
             self._note("")
 

@@ -17,8 +17,7 @@ from .store import DamagedError
 def main(tasks: str, record: str, digest: str, study: str) -> None:
     """Do the job of a note, and write its record."""
     warnings.simplefilter("ignore", AssumptionWarning)  # reading the study has warned
-    note = _note(tasks, digest)
-    if not note:
+    if not (note := _note(tasks, digest)):
         from ..config.expand import load
         from ..config.model import kinds  # here: a run has written the notes of all jobs
         from .plan import stage_jobs
