@@ -14,10 +14,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+from typing import Any, TypeVar
 
 HOOKS = {"drawing": "studies.output.style", "files": "handover.formats"}
 """Modules that others call by name, mostly those of upper rooms: grimp counts an import inside a function, so that the
@@ -36,7 +33,7 @@ GROUPS = ("definitions", "engines", "loads", "mesh_types")  # groups of entry po
 
 
 @cache
-def plugins() -> "dict[str, list[EntryPoint]]":
+def plugins() -> dict[str, list[Any]]:
     """Entry points of other packages by group, sorted by package."""
     if os.environ.get(PLUGINS_VARIABLE) == "none":
         return dict.fromkeys(GROUPS, [])
@@ -46,7 +43,7 @@ def plugins() -> "dict[str, list[EntryPoint]]":
     return {group: sorted(found.select(group=f"springtune.{group}"), key=_package) for group in GROUPS}
 
 
-def _package(one: "EntryPoint") -> str:
+def _package(one: Any) -> str:
     return one.dist.name if one.dist else one.module
 
 
@@ -109,12 +106,10 @@ class ExtensibleMapping(Mapping[str, Entry]):
     `adopt` checks an imported object, and returns the entry or raises ValueError: then a `PluginWarning` says why.
     """
 
-    def __init__(
-        self, what: str, group: str, entries: dict[str, Entry], adopt: Callable[[str, Any], Entry] | None = None
-    ) -> None:
+    def __init__(self, what: str, group: str, entries: dict[str, Entry], adopt: Any = None) -> None:
         self._what, self._group, self._adopt = what, group, adopt
         self._entries = entries
-        self._tried: dict[EntryPoint, str] = {}
+        self._tried: dict[Any, str] = {}
         self.packages: dict[str, str] = {}
 
     def _discover(self) -> None:
@@ -124,7 +119,6 @@ class ExtensibleMapping(Mapping[str, Entry]):
         """Add the entry of another package."""
         if name in self._entries:
             raise ValueError(f"'{self.packages.get(name, 'springtune')}' has one of that name; it needs another")
-        assert self._adopt
         self._entries = self._entries | {name: self._adopt(name, found)}
 
     def _load(self, name: str = "") -> str:

@@ -374,7 +374,6 @@ class Textbook:
     """
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
-        assert net.masses is not None  # of a scene that moves
         dtype = np.dtype(setting.precision or "float64")
         self.dtype, self.h = dtype, dtype.type(setting.step)
         self.substeps, self.iterations = setting.substeps, setting.iterations

@@ -29,7 +29,6 @@ class ImplicitEuler:
     """Implicit Euler, linearised once a step, with iterations of conjugate gradients; SOFA takes 25."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
-        assert net.masses is not None  # of a scene that moves
         reference = float(net.header["reference_stiffness"])
         motion = Motion(network_of(net, reference), net.masses / reference, net.forces / reference)
         solver = BackwardEuler(setting.iterations, TOLERANCE)

@@ -94,7 +94,6 @@ def _model(net: SpringNet) -> Any:
     import newton
     from warp import vec3
 
-    assert net.masses is not None  # of a scene that moves
     count = len(net.points)
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
     masses = np.where(net.held.all(axis=1), 0, net.masses)

@@ -17,7 +17,6 @@ from .base import Parameter, Setting, Textbook, engine, project_springs, refuse_
 
 def shares(net: SpringNet, setting: Setting) -> np.ndarray:
     """Stiffness of position-based dynamics for each spring of a net [1]; 0 where both ends are held."""
-    assert net.masses is not None  # of a scene that moves
     weights = np.where(net.held, 0, 1 / net.masses[:, None])[net.springs].sum(axis=1)
     along = (net.points[net.springs[:, 1]] - net.points[net.springs[:, 0]]) / net.rest_lengths[:, None]
     grown = net.stiffness * setting.step**2 * np.einsum("ij,ij->i", weights, along**2)

@@ -120,7 +120,7 @@ class Net:
     rest_lengths: np.ndarray
     stiffness: np.ndarray
     energies: tuple[Terms, ...]
-    masses: np.ndarray | None
+    masses: Any  # an array, or None of a scene that does not move
     thickness: float
     held: np.ndarray
     forces: np.ndarray
@@ -215,7 +215,6 @@ def simulate(
 ) -> Simulation:
     """Masses, damping, step and equilibrium of a net for a simulator, whose own `energies` may stand for the net's."""
     _check(net, program, laws)
-    assert net.masses is not None
     reference = float(net.header["reference_stiffness"])
     load = net.header.get("load")
     # Of a shape, whose load case is of several forces, the factor on it.

@@ -294,8 +294,7 @@ def find_mesh(
     elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     else:
-        is_a(material, Material, "material")
-        assert isinstance(material, Material)  # for type checkers
+        material = is_a(material, Material, "material")
         given = MESH_TYPES if mesh_types is None else mesh_types
         names = choices.check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
         known = choices.references(beam, material, loads)

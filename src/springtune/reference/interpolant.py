@@ -7,16 +7,13 @@ interpolated; coefficients and error fall geometrically (Trefethen, Approximatio
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from ..problem.loads import LoadKind
-
-if TYPE_CHECKING:
-    from .small_strain import ReferenceSolution
 
 TOLERANCE = 2e-5  # largest relative error estimate of an interpolant by default [1], a fifth of that of a reference
 
@@ -80,7 +77,7 @@ class Interpolant:
         aspect_range: tuple[float, float],
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
-        solve: Callable[..., "ReferenceSolution"] | None = None,
+        solve: Callable[..., Any] | None = None,
     ) -> Self:
         """Build an interpolant over a box of aspect ratios and Poisson's ratios, with as many solves as it needs."""
         from .small_strain import solve_unit  # here: who reads an interpolant does without scipy
@@ -125,7 +122,7 @@ class _Box:
     aspect_range: tuple[float, float]
     nu_range: tuple[float, float]
     tolerance: float
-    solver: Callable[..., "ReferenceSolution"]
+    solver: Callable[..., Any]
     #: Answers in the order of `ANSWER_NAMES`, and error estimates, by place in the box (-1 to 1 on each axis).
     solved: dict[tuple[float, float], tuple[np.ndarray, float]] = field(default_factory=dict)
 

@@ -186,9 +186,8 @@ class BeamProblem(BoundaryProblem):
         cache: MeshCache | None = None,
     ) -> None:
         is_a(beam, Beam, "beam")
-        is_a(mesh, Mesh, "mesh")
-        is_a(material, Material, "material")
-        assert isinstance(mesh, Mesh) and isinstance(material, Material)  # for type checkers
+        mesh = is_a(mesh, Mesh, "mesh")
+        self.material: Material = is_a(material, Material, "material")
         self.cache = cache_of(mesh, beam.thickness, cache)
         if beam not in self.cache.filled:
             check_filled(mesh, beam)
@@ -198,10 +197,10 @@ class BeamProblem(BoundaryProblem):
             raise ValueError("force: none; give the size of the force on the beam such as '400 kN'")
         self.size = positive(force, "force", "force")
         self.force = about.sign * self.size
-        self.beam, self.material, self.kind, self.case = beam, material, about.kind, about.kind.case
+        self.beam, self.kind, self.case = beam, about.kind, about.kind.case
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
         self.body, self.label, self.thickness = beam.label, f"{self.load} of {self.size:g} N", beam.thickness
-        self.by_part = {"": material}
+        self.by_part = {"": self.material}
         self.grouped, self.loading = self.cache.loaded(self.kind), self.cache.loading(self.kind, self.follower)
 
     def check(self, definition: Definition) -> None:
@@ -245,8 +244,7 @@ class ShapeProblem(BoundaryProblem):
         cache: MeshCache | None = None,
     ) -> None:
         is_a(shape, Shape, "shape")
-        is_a(grouped, GroupedMesh, "mesh")
-        assert isinstance(grouped, GroupedMesh)  # for type checkers
+        grouped = is_a(grouped, GroupedMesh, "mesh")
         self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from math import inf
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from ..problem.shapes import Beam, Shape
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 from ..springs.parts import derive_by_parts
+
+_T = TypeVar("_T")
 
 NETWORKS_KEPT = 6  # factorized networks of a mesh that are kept; few are enough for scenes in order
 
@@ -52,14 +54,15 @@ def definition_of(definition: AnyDefinition) -> Definition:
     return choose(DEFINITIONS, definition, "definition")
 
 
-def is_a(value: object, wanted: Any, name: str) -> None:
-    """Refuse an argument of another type."""
+def is_a(value: object, wanted: type[_T] | Any, name: str) -> _T:
+    """Return an argument; refuse another type."""
     if wanted is Material and isinstance(value, AnisotropicMaterial):
         only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
-        first, *_ = get_args(wanted) or [wanted]
+        first: Any = (*get_args(wanted), wanted)[0]
         example = EXAMPLES.get(first, f"springtune.{first.__name__}(...)")
         raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
+    return value
 
 
 def given_stiffness(definition: Definition, stiffness: float | str | None) -> float | None:

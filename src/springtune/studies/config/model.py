@@ -8,19 +8,14 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from springtune.problem.materials import AnyMaterial, Material
 from springtune.problem.quantities import choose, shown_order
-from springtune.problem.shapes import Beam
+from springtune.problem.shapes import Beam, Shape
 from springtune.registry import import_name
-
-if TYPE_CHECKING:
-    from springtune.problem.shapes import Shape
-
-    from .messages import Problems
 
 FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 """Reference of sheets at finite strain for networks with nonlinear kinematics."""
@@ -327,7 +322,7 @@ class StudyKind:
     alone: tuple[str, ...] = ()  # keys that a study may have instead of grids; by default its optional keys
     reads: tuple[str, ...] = ()  # other keys of a study that it reads
     files: Callable[[Any], Iterable[Path]] = lambda part: ()  # further input files
-    check: Callable[[Any, Problems], None] = lambda config, problems: None
+    check: Callable[[Any, Any], None] = lambda config, problems: None
     expand: Callable[[Any, Any], Any] = lambda config, declared: ()  # part of a study, of its config and `Declared`
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}  # labels by dimension
     summary: Callable[[Any], list[list[object]]] = lambda part: []  # rows of `springtune scenes`

@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from springtune import __version__
 from springtune.mesh.cells import MESH_TYPES
@@ -30,9 +30,6 @@ from springtune.springs.base import DEFINITIONS
 
 from ..config.model import Study, kinds
 from .source import COMMIT_FILE, PACKAGE, checksum, clone, hash_of
-
-if TYPE_CHECKING:
-    from grimp import ImportGraph
 
 CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
 """Packages whose versions do not influence results: they carry numbers as they are."""
@@ -97,7 +94,7 @@ class Closure(NamedTuple):
 
 
 @cache
-def imports_graph() -> "ImportGraph":
+def imports_graph() -> Any:
     """Imports of all modules of this package."""
     import grimp  # here: a job asks for few keys
 

@@ -11,14 +11,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
 from springtune.safe_io import write_bytes
-
-if TYPE_CHECKING:
-    import h5py
 
 SCALARS = "scalars"
 
@@ -45,7 +42,7 @@ class OtherLayoutError(DamagedError):
 
 
 @contextmanager
-def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]], Places]]":
+def _opened(path: str | Path) -> "Iterator[tuple[Any, dict[str, dict[str, Any]], Places]]":
     """Context of a file, its scalars by key and label, and the places of its arrays."""
     import h5py  # here: a plan reads no results
 
@@ -157,7 +154,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     write_bytes(path, image.getvalue())
 
 
-def _put(file: "h5py.File", name: str, rows: np.ndarray) -> None:
+def _put(file: Any, name: str, rows: np.ndarray) -> None:
     """Store arrays, each in one chunk with its checksum; empty ones have nothing to check."""
     chunked = {"chunks": (1, *rows.shape[1:]), "fletcher32": True} if rows.size else {}
     file.create_dataset(name, data=rows, **chunked)

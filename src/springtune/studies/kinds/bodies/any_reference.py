@@ -20,8 +20,8 @@ def read(folder, reference, fields=()):
     if interpolant is None:
         found = results.get(reference["key"], {"message": why, "seconds": 0.0})
     else:
-        answers = interpolant.evaluate(*reference["problem"])
-        found = {name: float(getattr(answers, name)) for name in ANSWERS}
+        answers = interpolant.evaluate(*reference["problem"])._asdict()
+        found = {name: float(value) for name, value in answers.items()}
         found |= {"message": "", "seconds": seconds, "solves": interpolant.solves}
     return stored.scaled(found, reference)
 

@@ -8,12 +8,12 @@ from functools import cache, lru_cache
 from math import ceil, floor, log10
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springtune.problem.loads import LOADS
-from springtune.problem.shapes import size_text
+from springtune.problem.materials import Material
+from springtune.problem.shapes import Beam, size_text
 from springtune.reference.answers import unit_problem, unit_scales
 from springtune.safe_io import aligned
 from springtune.springs.base import DEFINITIONS
@@ -27,12 +27,9 @@ from . import shapes as of_shapes
 from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, mesh_name, stems
 from .stored import CALIBRATION_STEM
 
-if TYPE_CHECKING:
-    from springtune.problem.materials import Material
-    from springtune.problem.shapes import Beam
+Body = tuple[Beam, Material, str]
 
-    Body = tuple[Beam, Material, str]
-    Box = tuple[tuple[float, float], tuple[float, float]]
+Box = tuple[tuple[float, float], tuple[float, float]]
 
 
 def particles(area, mesh_size):
