@@ -10,7 +10,7 @@ from contextlib import redirect_stderr, redirect_stdout, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -19,9 +19,6 @@ from ..registry import NAME, NAME_RULE, how_to_install
 from ..safe_io import aligned, write_bytes, write_text
 from ..studies.runs.source import CONFIG_FOLDER, TASKS, USUAL_STUDY, config_file, is_source_tree, workflow_folder
 from . import PATH, WrongCall, command, file_errors
-
-if TYPE_CHECKING:
-    from ..studies.config.model import Study
 
 MANUAL = "`springtune docs` prints where every key is explained"  # comment in new studies
 
@@ -128,7 +125,7 @@ def scenes(config: Path, results: Path) -> None:
     click.echo(f"\n{_stored_text(study, results / 'results' / study.name)}")
 
 
-def _stored_text(study: "Study", folder: Path) -> str:
+def _stored_text(study: Any, folder: Path) -> str:
     """Text on a study's stored results, and on what a run computes."""
     from ..studies.runs import plan, store
 
@@ -275,11 +272,11 @@ def _is_dry_run(options: list[str]) -> bool:
     return not {"-n", "-np", "--dry-run", "--dryrun"}.isdisjoint(options)
 
 
-def _results(study: "Study") -> Path:
+def _results(study: Any) -> Path:
     return Path("results") / study.name
 
 
-def _unlock(studies: "list[Study]", options: list[str]) -> None:
+def _unlock(studies: list[Any], options: list[str]) -> None:
     """Remove the lock of a killed run; refuse a study under computation, a read-only folder and a full disk."""
     from ..studies.runs import locks
 
@@ -297,7 +294,7 @@ def _unlock(studies: "list[Study]", options: list[str]) -> None:
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
 
-def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
+def _outdated(studies: list[Any], remedy: str) -> dict[Path, str] | None:
     """Records of outdated jobs, with the reasons; None if a job was never done. Missing files are printed."""
     from ..studies.runs import plan
 
@@ -320,7 +317,7 @@ def _wants_slurm(options: list[str]) -> bool:
     return any(Path(one).name == "slurm" for one in named)
 
 
-def _load(path: Path) -> "Study":
+def _load(path: Path) -> Any:
     """Study of a file; an error is printed and ends the command."""
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study

@@ -9,7 +9,7 @@ and the kind of load remain, so beams share it.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -124,10 +124,6 @@ def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
     return beyond_linear(force * result["rotation"], force * result["strain"])
 
 
-if TYPE_CHECKING:
-    from ..mesh.cells import Mesh
-
-
 def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Interpolate displacements (n_x, n_y, 2) on an ascending grid at points (n, 2) inside, by cubic splines.
 
@@ -146,7 +142,7 @@ def outline(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[np
     return np.stack([x[i], y[j]], axis=1), displacements[i, j]
 
 
-def field_error(mesh: "Mesh", displacements: np.ndarray, reference: np.ndarray) -> float:
+def field_error(mesh: Any, displacements: np.ndarray, reference: np.ndarray) -> float:
     """Return the L2 difference of displacement fields (n_points, 2) over the norm of the reference's [1]."""
     fields = displacements - reference, reference
     difference, size = (mesh.particle_areas @ (field**2).sum(axis=1) for field in fields)

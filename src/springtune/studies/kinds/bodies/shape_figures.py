@@ -322,7 +322,12 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     'area'
     """
     fields, scenes = group(data, "shape_fields", alone=False), group(data, "shapes")
-    case = fields.sel(case=", ".join(choose(scenes.status != 0, shape=shape, load=load).values()))
+    names = list(zip(fields.shape_name.values.tolist(), fields.load_name.values.tolist()))
+    here = [i for i, one in enumerate(names) if shape in (None, one[0]) and load in (None, one[1])]
+    if len(here) != 1:
+        what = "choose one shape and load" if here else "nothing has this shape and load; there is"
+        raise ValueError(f"{what}: {'; '.join(map(', '.join, names))}")
+    case = fields.isel(case=here[0])
     about = {name: str(case[f"{name}_name"].item()) for name in ("shape", "load", "material", "kinematics")}
     mesh = {"mesh_type": str(case.mesh_type_name.item()), "mesh_size": float(case.case_mesh_size)}
     cut = scenes.sel(about | mesh)
