@@ -119,13 +119,14 @@ def stage_jobs(study: Study, folder: Path) -> dict[str, Job]:
     return jobs
 
 
-def _job(stage: Stage, folder: Path, label: str, tasks: Iterable[Task]) -> Job:
-    files: dict[tuple[str, str], dict[str, Any]] = {}
+def _job(stage: Stage, folder: Path, label: str, tasks: Sequence[Task]) -> Job:
+    files, seen = dict[tuple[str, str], dict[str, Any]](), dict[tuple[str, int], dict[str, Any]]()
     for task in tasks:
         key = task.key_of(stage)
-        name = task.file or key
-        file = files.setdefault((name, repr(task.shared)), {"name": name, **task.shared, "tasks": {}})
-        file["tasks"][key] = {"key": key, **task.values}
+        name, shared = task.file or key, id(task.shared)
+        if (name, shared) not in seen:  # a text of what is shared takes longer than the rest
+            seen[name, shared] = files.setdefault((name, repr(task.shared)), {"name": name, **task.shared, "tasks": {}})
+        seen[name, shared]["tasks"][key] = {"key": key, **task.values}
     content = {
         "results": str(folder),
         "folder": str(folder / stage.folder),
