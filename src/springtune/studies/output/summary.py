@@ -129,15 +129,15 @@ def _errors(cells: "pd.DataFrame", data: "xr.Dataset", names: tuple[str, str], m
 
 def _stiffness_to_type(cells: "pd.DataFrame") -> Iterator[str]:
     """What to type on the finest mesh of each type and material, of the best definitions."""
+    answers = [one for found in what_to_type(cells) for one in found]
     rows = [
         [one.definition + " +" * one.energies, *one.labels, f"{1e3 * one.mesh_size:.4g} mm",
          range_text(one.inside), range_text(one.outline), f"{one.ratio:.3g}" if np.isfinite(one.ratio) else "",
          f"{100 * one.median_error:.2g} %"]
-        for answers in what_to_type(cells)
         for one in answers
     ]  # fmt: skip
     if rows:
-        plus = "; best with energies besides springs (+)" if any(row[0].endswith("+") for row in rows) else ""
+        plus = "; best with energies besides springs (+)" if any(one.energies for one in answers) else ""
         yield from ("", f"what to type [N/m], on the finest mesh: best springs alone; best single stiffness{plus}")
         heads = ["definition", "mesh type", "material", "size", "inside", "outline", "inside / E t", "median error"]
         yield from aligned([heads, *rows], 2, range(3, 8)).splitlines()

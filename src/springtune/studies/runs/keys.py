@@ -216,7 +216,7 @@ def _files_below(root: Path, parts: list[str]) -> set[Path]:
 @cache
 def distribution(package: str) -> str:
     """Distribution that contains a package, as ``scikit-fem`` for ``skfem``."""
-    if package in DISTRIBUTIONS or version_of(package) != "none":
+    if package in DISTRIBUTIONS or package in SOFTWARE or version_of(package) != "none":
         return DISTRIBUTIONS.get(package, package)
     from importlib.metadata import packages_distributions
 

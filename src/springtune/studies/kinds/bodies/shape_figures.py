@@ -251,8 +251,6 @@ def magnification(fields):
     return float(steps[steps <= factor * (1 + 1e-9)][-1])
 
 
-COLOURS = 256  # colours of matplotlib's maps
-
 NETWORK_LINE_WIDTH = 0.35  # width of the lines of springs that have one colour [pt]
 
 
@@ -279,10 +277,10 @@ def draw_network(panel, fields, scale, most=0.0, cmap=None):
         panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE_WIDTH)
         return None
     width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
-    levels = np.clip(np.floor((fields.spring_force.values[kept] / most + 1) * COLOURS / 2), 0, COLOURS - 1)
+    levels = np.clip(np.floor((fields.spring_force.values[kept] / most + 1) * cmap.N / 2), 0, cmap.N - 1)
     shown = np.unique(levels)
     coloured = [gaps[levels == level].reshape(-1, 2) for level in shown]
-    middle = most * ((2 * shown + 1) / COLOURS - 1)
+    middle = most * ((2 * shown + 1) / cmap.N - 1)
     lines = LineCollection(coloured, array=middle, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
     panel.add_collection(lines, autolim=False)
     panel.update_datalim(springs.reshape(-1, 2))
