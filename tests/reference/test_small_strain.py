@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as some
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
@@ -189,6 +189,7 @@ def test_the_bound_of_rounding_is_positive_where_bodies_grow_thicker_as_they_are
 
 @settings(max_examples=12)
 @given(aspect_ratio=some.floats(0.2, 30), nu=some.floats(0, 0.5), kind=some.sampled_from(list(LOAD_KINDS.values())))
+@example(aspect_ratio=4.0, nu=0.25, kind=FACE)  # the middle is further off than its last step
 def test_error_estimate_is_honest(aspect_ratio, nu, kind):
     body, material = st.Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any"), st.Material(3e9, nu, name="any")
     result = solve_small_strain(body, material, 7.0, kind=kind)
@@ -196,8 +197,11 @@ def test_error_estimate_is_honest(aspect_ratio, nu, kind):
     # Level 7 has smaller elements at the corners and polynomials of a higher degree than what converged.
     finer = UnitLevel(2 * aspect_ratio, nu, 7, kind)
     assert finer.unknowns > 1.5 * result.unknowns
-    exact = finer.measured * 7.0 / (2 * (aspect_ratio if kind in (SHEAR, FACE) else 1.0) * 3e9 * 1e-3)
-    assert abs(result.displacement / exact - 1) < result.error_estimate
+    scale = 7.0 / (2 * (aspect_ratio if kind in (SHEAR, FACE) else 1.0) * 3e9 * 1e-3)
+    assert abs(result.mean_displacement / (finer.displacement * scale) - 1) < result.error_estimate
+    # The middle of a pressed side is no energy: its estimate is no bound, but the tolerance is kept.
+    promised = 1e-4 if kind is FACE else result.error_estimate
+    assert abs(result.displacement / (finer.measured * scale) - 1) < promised
 
 
 @pytest.mark.parametrize("nu", [0.1, 0.3, 0.5])

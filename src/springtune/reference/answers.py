@@ -22,7 +22,8 @@ from ..problem.shapes import Beam
 class BeamField:
     """Displacements of a beam that a reference finds.
 
-    - `displacement`, `error_estimate`: Displacement of the load [m], and a bound on its relative error [1].
+    - `displacement`, `error_estimate`: Displacement of the load [m], and a bound on its relative error [1]; of the
+      middle of a pressed side an estimate.
     - `mean_displacement`: Mean displacement of the loaded side along the force [m].
     - `displacements` (n_x, n_y, 2): On the grid `x`, `y` at rest [m], denser near the outline.
     """

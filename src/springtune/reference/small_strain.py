@@ -96,6 +96,10 @@ def solve_small_strain(
     so lambda = .69 at nu = .5 and .76 at .3, factors of .11 and .09; measured .07 to .12. While each step is at most
     half of the last, all later ones together are at most the last one, which is the error estimate; steps must be seen
     to halve. It exceeds the true error some tenfold.
+
+    The middle of a pressed side is no energy. Its own last step counts, too, but its steps change sign, and one may be
+    small by chance: the estimate is no bound then. Of 540 bodies with aspect ratios from .2 to 30 the error exceeds it
+    in eight, at worst 2e-7 instead of 5e-9. All errors are below 2e-5 at the tolerance 1e-4.
     """
     if not kind.mirrored:
         raise ValueError(f"supports of '{kind}' are not symmetric; half of a beam is solved")
