@@ -20,7 +20,7 @@ JOBS = {
 }
 TABLE = yaml.safe_load(Path(__file__).with_name("rows.yaml").read_text())
 SCENES = {"linear": 24, "nonlinear": 25}
-RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 2, "contrast": 1} | SCENES}
+RESULTS = {"SCENES": SCENES, "NETWORKS": dict(SCENES, curve=16, calibrate=2, moduli=2, laying=2, contrast=1)}
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,7 @@ def row(change, jobs="", solved=None):
     for name, count in (solved or {}).items():
         for kind, one in (RESULTS.get(name) or {name: count}).items():
             counts[TABLE["stages"].get(kind, kind)] = counts.get(TABLE["stages"].get(kind, kind), 0) + one
-    names = {job for name in jobs.split() for job in JOBS.get(name, name).split()}
-    if "calibrate" in names:
-        counts.setdefault("calibrate", 2)  # one a mesh type
-    return Row(change, names, {name: count for name, count in counts.items() if count})
+    return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts)
 
 
 def replace(*pairs):

@@ -1,5 +1,6 @@
 """What runs again when something changes: exactly these jobs, exactly these results, and the dataset of a fresh run."""
 
+import contextlib
 import hashlib
 import json
 import os
@@ -25,10 +26,8 @@ def complete(tmp_path_factory):
     os.environ["MPLBACKEND"] = "Agg"
     folder = tmp_path_factory.mktemp("complete") / "study"
     driver.prepare(folder)
-    before = os.getcwd()
-    os.chdir(folder)
-    driver.Run().finish()
-    os.chdir(before)
+    with contextlib.chdir(folder):
+        driver.Run().finish()
     return folder
 
 
@@ -71,20 +70,29 @@ def fresh(tmp_path_factory, complete):
             for path, content in files.items():
                 (folder / path).parent.mkdir(parents=True, exist_ok=True)
                 (folder / path).write_bytes(content)
-            before = os.getcwd()
-            os.chdir(folder)
-            driver.Run().finish()
-            os.chdir(before)
+            with contextlib.chdir(folder):
+                driver.Run().finish()
             known[mark] = driver.dataset(folder)
         return known[mark]
 
     return of
 
 
+def scenes(job, content):
+    """Scenes of a job by all that its digest has of them."""
+    tasks = (task for file in content["files"] for task in file["tasks"])
+    return {(task["key"], *map(task.get, job.stage.unkeyed)): task for task in tasks}
+
+
 @pytest.mark.parametrize("planned", STUDY, indirect=True)
-def test_exactly_these_jobs_are_to_run(planned):
+def test_exactly_these_jobs_are_to_run(planned, complete):
+    """A digest has all that a change changes: scenes that are the same to it are the same before and after."""
     run = driver.Run()
     assert {run.called(name) for name in run.due()} == planned.jobs
+    job = run.jobs["solve_0"]
+    before = scenes(job, read_note(complete / job.tasks)["content"])
+    now = scenes(job, json.loads(json.dumps(job.content)))
+    assert all(now[mark] == before[mark] for mark in before.keys() & now.keys())
 
 
 @pytest.mark.parametrize("changed", STORED, indirect=True)
