@@ -67,20 +67,22 @@ class Multigrid:
     unknowns n, a factorization's as n^(3/2) and n log n. Method: J. Xu, The auxiliary space method and optimal
     multigrid preconditioning techniques for unstructured grids, Computing 56:215, 1996.
 
+    `assemble` returns the matrix, again if grids of its own are laid later: one of a million particles takes 100 MB.
     `points` (n_points, 2) are in m, and `held` (n_points, 2) marks directions that cannot move. `besides` is a matrix
     (2 n_points, 2 n_points) added in products alone. `name` is ``"multigrid"``, or that of the factor that took over.
     """
 
     def __init__(
         self,
-        matrix: Blocks,
+        assemble: Callable[[], Blocks],
         points: np.ndarray,
         held: np.ndarray,
         otherwise: Callable[[], Factor] | None = None,
         like: "Multigrid | None" = None,
         besides: csr_array | None = None,
     ) -> None:
-        self._matrix, self._otherwise, self._points, self._besides = matrix, otherwise, points, besides
+        self._assemble, self._otherwise, self._points, self._besides = assemble, otherwise, points, besides
+        matrix = assemble()
         self._held, self._places, self._product = held, np.flatnonzero(~held), chunked(matrix)
         self.name = "multigrid"
         self._direct: Factor | None = None
@@ -89,12 +91,12 @@ class Multigrid:
         self._coarsest: Any = like._coarsest if like else None
         self._borrowed = self._coarsest is not None
         if not self._borrowed:
-            self._lay_grids()
+            self._lay_grids(matrix)
 
-    def _lay_grids(self) -> None:
+    def _lay_grids(self, matrix: Blocks) -> None:
         """Levels, and unknowns and dense factor of the coarsest one; neither if the matrix is not positive definite."""
         self._borrowed, self._levels, self._coarsest = False, [], None
-        matrix, grid, places = self._matrix, first_grid(self._points, COARSENING), self._places
+        grid, places = first_grid(self._points, COARSENING), self._places
         # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
         # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
         if not (matrix.diagonal[:, ::2].ravel()[places] > 0).all():
@@ -170,7 +172,7 @@ class Multigrid:
             return solution
         proves = not self._certain and tolerance <= CERTAIN
         if proves:
-            xx, xy, yy = self._matrix.diagonal.T
+            xx, xy, yy = self._product.diagonal.T
             product = np.where(self._held[:, 0], 1.0, xx) * np.where(self._held[:, 1], 1.0, yy)
             if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
                 raise SingularError("a particle is free to move: its springs, if any, are in one line")
@@ -191,7 +193,7 @@ class Multigrid:
                 self._certain |= proves
                 return solution
             if self._borrowed and count == MOST_BORROWED:
-                self._lay_grids()
+                self._lay_grids(self._assemble())
                 return solution + self._gradients(missing, tolerance * size / float(np.linalg.norm(missing)))
             # The weight is in units of the scaled residual, as the preconditioner is linear.
             before = weight

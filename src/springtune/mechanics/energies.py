@@ -6,14 +6,14 @@ fields have shape (2, m, n_cells), several times faster in numpy than short vect
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
-from ..mesh.cells import DIAGONALS, SIDES
+from ..mesh.cells import DIAGONALS, SIDES, pieces
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -72,12 +72,17 @@ class Energy(ABC):
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
         """Derivative of the energy by the corners' positions [m], shape (n_cells, m, 2)."""
-        return self._forces(self._at_corners(displacements)).transpose(2, 1, 0)
+        field = np.asfortranarray(displacements)
+        parts = [part._forces(part._at_corners(field)) for part in self._parts]
+        return np.concatenate(parts, axis=-1).transpose(2, 1, 0)
 
     def couplings(self, displacements: np.ndarray | None = None) -> np.ndarray:
         """Return tangent blocks of pairs of corners [1], (n_pairs, 2, 2, n_cells), as `Mesh.cell_edges` orders them."""
-        moved = np.zeros(self._rest.shape) if displacements is None else self._at_corners(displacements)
-        return self._couplings(moved)
+        field = np.asfortranarray(np.zeros(self.points.shape) if displacements is None else displacements)
+        blocks = np.empty((len(self._pairs), 2, 2, len(self.corners)))
+        for rows, part in zip(pieces(len(self.corners)), self._parts):
+            blocks[..., rows] = part._couplings(part._at_corners(field))
+        return blocks
 
     def tangent(self, displacements: np.ndarray | None = None) -> np.ndarray:
         """Second derivative by the corners' positions [1], shape (n_cells, 2 m, 2 m); at rest without displacements."""
@@ -113,6 +118,14 @@ class Energy(ABC):
     @property
     def _pairs(self) -> tuple[tuple[int, int], ...]:
         return SIDES[self.corners.shape[1]] + DIAGONALS[self.corners.shape[1]]
+
+    @cached_property
+    def _parts(self) -> list["Energy"]:
+        """Energies of some cells each, see `pieces`."""
+        own = {one.name: value for one in fields(self)[1:] if np.ndim(value := getattr(self, one.name))}
+        slices = pieces(len(self.corners))
+        split = len(slices) > 1
+        return [replace(self, **{n: value[part] for n, value in own.items()}) for part in slices] if split else [self]
 
     @cached_property
     def _rest(self) -> np.ndarray:

@@ -10,7 +10,7 @@ equal F/k.
 
 import copy
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy.sparse import csc_array
 
 from ..linalg import SOLVERS
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
-from ..mesh.cells import Mesh
+from ..mesh.cells import Mesh, pieces
 from ..mesh.sheets import check_held
 from .energies import Energy
 from .pattern import Pattern
@@ -45,6 +45,8 @@ def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool
     most = MOST_CHOLESKY_UNKNOWNS if direct else NO_CHOLESKY_FROM_UNKNOWNS
     return ("Cholesky" if direct else "SuperLU") if solver is None and unknowns <= most else None
 
+
+ALL = slice(None)
 
 NO_STIFFNESS = 1e-12  # stiffness of a spring or a motion, over the stiffest spring, that counts as zero
 
@@ -116,9 +118,9 @@ class Network:
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths
 
-    def end_differences(self, displacements: np.ndarray) -> np.ndarray:
+    def end_differences(self, displacements: np.ndarray, part: slice = ALL) -> np.ndarray:
         """Difference of the displacements of each spring's ends [m], shape (n_springs, 2)."""
-        return displacements.take(self.second, axis=0) - displacements.take(self.first, axis=0)
+        return displacements.take(self.second[part], axis=0) - displacements.take(self.first[part], axis=0)
 
     def gather(self, forces: np.ndarray) -> np.ndarray:
         """Unknowns' share of spring forces, shape (n_springs, 2), that pull the first end towards the second."""
@@ -139,19 +141,22 @@ class Network:
             total += self._pattern.sum_cells(energy.corners, energy.forces(displacements))
         return total
 
-    def _spring_vectors(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _spring_vectors(self, displacements: np.ndarray, part: slice = ALL) -> tuple[np.ndarray, ...]:
         """Return each spring's vector [m], length [m] and growth of the squared length [m2], without cancellation."""
-        relative = self.end_differences(displacements)
-        vectors = self.rest_vectors + relative
-        squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
+        relative, rest = self.end_differences(displacements, part), self.rest_vectors[part]
+        vectors = rest + relative
+        squares = np.einsum("ij,ij->i", rest + vectors, relative)
         return vectors, np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), squares
 
     def _end_forces(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force of each spring on its first end over k [m], shape (n_springs, 2)."""
-        vectors, lengths, squares = self._spring_vectors(displacements)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
-        return pull[:, None] * vectors
+        forces = np.empty(self.rest_vectors.shape)
+        for part in pieces(len(forces)):
+            vectors, lengths, squares = self._spring_vectors(displacements, part)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                pull = self.stiffness[part] * squares / ((lengths + self.rest_lengths[part]) * lengths)
+            np.multiply(pull[:, None], vectors, out=forces[part])
+        return forces
 
     def spring_forces_over_k(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
         """Return axial spring forces over k, tension positive [m]; energies are left out."""
@@ -223,27 +228,27 @@ class Network:
 
     def _spring_couplings(self, displacements: np.ndarray | None) -> np.ndarray:
         """Share of the springs in `_couplings`."""
-        if displacements is None:
-            vectors, ratio = self.rest_vectors, np.ones(len(self.rest_lengths))
-            squares = self.rest_lengths**2
-        else:
-            vectors = self.rest_vectors + self.end_differences(displacements)
-            squares = np.einsum("ij,ij->i", vectors, vectors)
-            ratio = self.rest_lengths / np.sqrt(squares)
-        along = self.stiffness * ratio / squares
-        across = self.stiffness * (1.0 - ratio)
-        x, y = vectors.T
-        couplings = np.empty((2, 2, len(along)))
-        couplings[0, 0] = -across - along * x * x
-        couplings[0, 1] = couplings[1, 0] = -along * x * y
-        couplings[1, 1] = -across - along * y * y
+        couplings = np.empty((2, 2, len(self.first)))
+        for part in pieces(len(self.first)):
+            vectors, lengths = self.rest_vectors[part], self.rest_lengths[part]
+            squares, ratio = lengths**2, np.ones(len(lengths))
+            if displacements is not None:
+                vectors = vectors + self.end_differences(displacements, part)
+                squares = np.einsum("ij,ij->i", vectors, vectors)
+                ratio = lengths / np.sqrt(squares)
+            along = self.stiffness[part] * ratio / squares
+            across = self.stiffness[part] * (1.0 - ratio)
+            x, y = vectors.T
+            couplings[0, 0, part] = -across - along * x * x
+            couplings[0, 1, part] = couplings[1, 0, part] = -along * x * y
+            couplings[1, 1, part] = -across - along * y * y
         return couplings
 
     @cached_property
     def local_stiffness(self) -> np.ndarray:
         """Return sums of stiffness about particles (n_points, 2); over mass they bound eigenvalues (Gershgorin)."""
         if self.energies:
-            return self.expand(np.asarray(abs(self.tangent()).sum(axis=1)).ravel())
+            return self._pattern.row_sums(self._couplings(None))
         count, size = len(self.held), np.abs(self.stiffness)
         sums = 2 * (np.bincount(self.first, size, count) + np.bincount(self.second, size, count))
         return np.repeat(sums[:, None], 2, axis=1)
@@ -373,7 +378,8 @@ class Network:
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
         takes_over = otherwise if next_one else None
-        return Multigrid(self.blocks(displacements), self.mesh.points, self.held, takes_over, like, besides)
+        assemble = partial(self.blocks, displacements)
+        return Multigrid(assemble, self.mesh.points, self.held, takes_over, like, besides)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

@@ -184,6 +184,15 @@ class Pattern:
             own[place] -= np.bincount(self.second, couplings[d, a], count)
         return own
 
+    def row_sums(self, couplings: np.ndarray) -> np.ndarray:
+        """Sums of the sizes of a row's entries in the tangent, from blocks as above, shape (n_points, 2)."""
+        free: np.ndarray = self.number >= 0
+        sizes, (xx, xy, yy) = np.abs(couplings), np.abs(self._own(couplings))
+        at_first = np.einsum("abn,nb->na", sizes, free[self.second])
+        at_second = np.einsum("ban,nb->na", sizes, free[self.first])
+        own = np.stack([xx + xy * free[:, 1], yy + xy * free[:, 0]], axis=1)
+        return free * (own + self.sum_springs(at_first, -at_second))
+
     def blocks(self, couplings: np.ndarray) -> Blocks:
         """Return the tangent in blocks, as `coupling_entries`, with zeros where directions are held."""
         from ..linalg.kernels import Blocks, row_pointers  # here: few networks are so large

@@ -89,6 +89,8 @@ class Expansion:
         self._inverse = 1.0 / self._length
         self._first = np.zeros(0)
         self._extend(order)
+        if rough:  # only a start: it is not extended, and these take 32 bytes a spring and order
+            del self._d, self._length, self._inverse
 
     def extended(self, order: int) -> "Expansion":
         """Return the series up to a higher order; this one does not change."""
