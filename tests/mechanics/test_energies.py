@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 import springtune as st
 from springtune.linalg.factors import SingularError, SuperLUFactor
 from springtune.mechanics import energies
-from springtune.mechanics.network import FollowerPressure
+from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.newton import MOST_MODES
 from springtune.mechanics.statics import FAR_STRETCH
 from springtune.problem.boundary import measured
@@ -141,6 +141,27 @@ def test_a_place_far_from_the_origin_costs_no_digits(kind):
     moved = np.round(scattered(mesh, 9, 1e-5) * 2**40) / 2**40
     here, away = (replace(energy, points=points + offset).forces(moved) for offset in (0.0, 1024.0))
     assert np.abs(away - here).max() <= 1e-9 * np.abs(here).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_network_computed_some_rows_at_a_time_is_the_same(kind, monkeypatch):
+    mesh, energy = energy_of(kind, 6)
+    here, held = scattered(mesh, 7, 1e-4), np.zeros(mesh.points.shape, dtype=bool)
+    held[:3], held[5, 1] = True, True
+
+    def computed():
+        network = Network(mesh, held, np.ones(len(mesh.edges)), [replace(energy)])
+        sums = np.asarray(abs(network.tangent()).sum(axis=1)).ravel()
+        assert network.reduce(network.local_stiffness) == pytest.approx(sums, rel=1e-9)
+        return network.forces_over_k(here), network.tangent(here).data
+
+    at_once = computed()
+    monkeypatch.setattr("springtune.mesh.cells.ROWS_AT_ONCE", 3)
+    for one, other in zip(at_once, computed()):
+        assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max()
+    turned = mesh.points.copy()
+    turned[mesh.edges[-1]] = turned[mesh.edges[-1][::-1]]  # only cells in the last rows turn
+    assert mesh.inverted(turned) and not mesh.inverted(mesh.points)
 
 
 def test_one_modulus_a_triangle_is_that_modulus_at_each_corner():

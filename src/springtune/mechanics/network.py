@@ -220,28 +220,28 @@ class Network:
 
     def _couplings(self, displacements: np.ndarray | None) -> np.ndarray:
         """Blocks of the tangent that couple the ends of each spring, shape (2, 2, n_springs)."""
-        couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros((2, 2, len(self.first)))
-        if self.energies:
-            at_rest, energies = displacements is None, self.energies
-            couplings += self._rest_couplings if at_rest else self._pattern.cell_couplings(energies, displacements)
+        if not self.energies:
+            return self._spring_couplings(displacements)
+        at_rest, energies = displacements is None, self.energies
+        couplings = self._rest_couplings.copy() if at_rest else self._pattern.cell_couplings(energies, displacements)
+        if self.has_springs:
+            couplings += self._spring_couplings(displacements)
         return couplings
 
     def _spring_couplings(self, displacements: np.ndarray | None) -> np.ndarray:
         """Share of the springs in `_couplings`."""
-        couplings = np.empty((2, 2, len(self.first)))
-        for part in pieces(len(self.first)):
-            vectors, lengths = self.rest_vectors[part], self.rest_lengths[part]
-            squares, ratio = lengths**2, np.ones(len(lengths))
-            if displacements is not None:
-                vectors = vectors + self.end_differences(displacements, part)
-                squares = np.einsum("ij,ij->i", vectors, vectors)
-                ratio = lengths / np.sqrt(squares)
-            along = self.stiffness[part] * ratio / squares
-            across = self.stiffness[part] * (1.0 - ratio)
-            x, y = vectors.T
-            couplings[0, 0, part] = -across - along * x * x
-            couplings[0, 1, part] = couplings[1, 0, part] = -along * x * y
-            couplings[1, 1, part] = -across - along * y * y
+        vectors, squares, ratio = self.rest_vectors, self.rest_lengths**2, np.ones(len(self.rest_lengths))
+        if displacements is not None:
+            vectors = vectors + self.end_differences(displacements)
+            squares = np.einsum("ij,ij->i", vectors, vectors)
+            ratio = self.rest_lengths / np.sqrt(squares)
+        along = self.stiffness * ratio / squares
+        across = self.stiffness * (1.0 - ratio)
+        x, y = vectors.T
+        couplings = np.empty((2, 2, len(along)))
+        couplings[0, 0] = -across - along * x * x
+        couplings[0, 1] = couplings[1, 0] = -along * x * y
+        couplings[1, 1] = -across - along * y * y
         return couplings
 
     @cached_property
