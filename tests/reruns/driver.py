@@ -12,7 +12,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1] / "support"))  # for `campaigns`, where this is a program
 
 import springtune as st
-from springtune.studies.runs import attempts, plan
+from springtune.studies.runs import plan
 
 from campaigns import Campaign, held
 
@@ -52,13 +52,6 @@ class Run(Campaign):
     def called(self, name):
         """Name of a job, without the number of its bundle."""
         return self.bundles[name].stage.name if name in self.bundles else name
-
-    def do_stage(self, name):
-        """A job of a stage, in this process, which compiles once what it needs."""
-        note = json.loads(self.bundles[name].tasks.read_text())
-        computed = attempts.do_tasks(note["module"], note["content"])
-        self.jobs[name].record.parent.mkdir(parents=True, exist_ok=True)
-        self.jobs[name].record.write_text(json.dumps({"digest": note["digest"], "computed": computed}))
 
 
 def prepare(folder):

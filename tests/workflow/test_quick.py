@@ -25,7 +25,7 @@ SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "ki
 def tree(run, repository):
     """By its jobs in this process; tests/studies/output/test_figures.py draws the other figures."""
     content = yaml.safe_load((repository / "config/quick.yaml").read_text())
-    content["outputs"] = ["size", "paraview", "tables"]
+    content["outputs"] = ["laying", "paraview", "tables"]
     del content["samples"]  # tests/studies/kinds/test_samples.py has them
     content["stability"]["experiment"].remove("slivers")  # tests/studies/kinds/test_stability.py has them
     content["benchmark"]["mesh_size"] = "5 mm"
@@ -196,7 +196,7 @@ def test_tables_and_figures_are_there(run, tree):
     page = (results / "tables/index.html").read_text()
     assert "Table 1" in page and "20 kN fits" in page
     for ending in ("png", "pdf"):
-        assert (results / f"figures/size_structured_rubber_traction.{ending}").stat().st_size > 5000
+        assert (results / f"figures/laying.{ending}").stat().st_size > 5000
 
 
 def test_paraview_has_the_scenes_whose_fields_are_kept(run, tree):

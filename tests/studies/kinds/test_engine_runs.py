@@ -12,6 +12,7 @@ import xarray as xr
 import springtune as st
 from springtune.studies.kinds.engines import RUN_ENDS
 from springtune.studies.output.comparison import compare
+from springtune.studies.runs.attempts import do_in_worker
 
 from campaigns import Campaign, forget_keys
 from tables import STUDIES
@@ -97,6 +98,12 @@ def collected(tmp_path, monkeypatch):
     return collect
 
 
+@pytest.fixture
+def workers(monkeypatch):
+    """Tasks run in processes of their own, which end with one, or import what is not there afterwards."""
+    monkeypatch.setattr(Campaign, "do_tasks", staticmethod(do_in_worker))
+
+
 def ends(data):
     """Words of how the runs of a group ended, each once."""
     return {RUN_ENDS[flag] for flag in np.unique(data.engine_status.values)}
@@ -135,7 +142,7 @@ def test_too_many_runs_and_cells_are_refused(refusal):
 # -- what comes out ----------------------------------------------------------------------------------------------------
 
 
-def test_every_end_is_in_the_dataset_with_its_reason(collected):
+def test_every_end_is_in_the_dataset_with_its_reason(collected, workers):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "precision: [own, float32]")
     tree = collected(*TOYS, "missing", text=text.replace("aborting, ", ""))
     data = tree["engines"].to_dataset().squeeze()
@@ -190,7 +197,7 @@ def test_the_best_factor_gives_the_references_displacement(collected):
 # -- what is computed again --------------------------------------------------------------------------------------------
 
 
-def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(collected, tmp_path, monkeypatch):
+def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(workers, collected, tmp_path, monkeypatch):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "iterations: 5")
     assert ends(collected("toy", "missing", text=text)["engines"]) == {"rest", "absent", "not_requested"}
     assert not stages_due()
