@@ -51,8 +51,7 @@ class Projective(Textbook):
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Iterate from the inertial positions."""
-        x = y.copy()
-        of_springs = self.springs, self.lengths, self.stiffness
+        x, of_springs = y.copy(), (self.springs, self.lengths, self.stiffness)
         for _ in range(self.iterations):
             _descent(x, y, self.inertia, self.free, *of_springs, self.descent)
             for factor, axes in self.systems:

@@ -36,7 +36,7 @@ def _volume(trace, area, shear, bulk):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _rubber(here, slopes, area, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
+def _rubber(here, slopes, rest, area, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
     """Constraints of a triangle of rubber and their derivatives; `growth` is its area's derivative by its corners."""
     across, turned, share = 0.0, 0.0, 1.0
     for c in range(3):
@@ -51,7 +51,7 @@ def _rubber(here, slopes, area, growth, law, compressible, value, by):  # type: 
     for c in range(3):
         by[0, c, 0], by[0, c, 1] = share * slopes[c, 0], -share * slopes[c, 1]
         by[1, c, 0], by[1, c, 1] = share * slopes[c, 1], share * slopes[c, 0]
-        by[2, c, 0], by[2, c, 1] = rise * growth[c, 0], rise * growth[c, 1]
+        by[2, c, 0], by[2, c, 1] = rise * (growth[c, 0] / rest), rise * (growth[c, 1] / rest)
     if not compressible:
         excess = value[0] ** 2 + value[1] ** 2 + value[2] ** 2
         scale = np.sqrt(1 + law[0] * excess + law[1] * excess**2)
@@ -61,12 +61,12 @@ def _rubber(here, slopes, area, growth, law, compressible, value, by):  # type: 
                 whole = value[0] * by[0, c, d] + value[1] * by[1, c, d] + value[2] * by[2, c, d]
                 for a in range(3):
                     by[a, c, d] = scale * by[a, c, d] + more * value[a] * whole
-        value *= scale
+        value[0], value[1], value[2] = value[0] * scale, value[1] * scale, value[2] * scale
 
 
 @compiled
 def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multipliers):  # type: ignore[no-untyped-def]
-    """Project all blocks of a kind once."""
+    """Project all blocks of a kind once; number by number, since operations on rows take seconds to compile."""
     size, corners = multipliers.shape[1], cells.shape[1]
     here, growth, value = np.empty((corners, 2), x.dtype), np.empty((corners, 2), x.dtype), np.empty(size, x.dtype)
     by, matrix = np.zeros((size, corners, 2), x.dtype), np.empty((size, size), x.dtype)
@@ -78,17 +78,18 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
             growth[c, 0], growth[c, 1] = 0.5 * (x[after, 1] - x[before, 1]), 0.5 * (x[before, 0] - x[after, 0])
             area += 0.5 * (here[c, 0] * growth[c, 0] + here[c, 1] * growth[c, 1])
         if kind == 0:
-            value[0], by[0] = area - rest[e, 0], growth
+            value[0] = area - rest[e, 0]
+            for c in range(corners):
+                by[0, c, 0], by[0, c, 1] = growth[c, 0], growth[c, 1]
         elif kind == 1:
             for c in range(3):
                 after, before = (c + 1) % 3, c - 1
                 dx, dy = here[before, 0] - here[after, 0], here[before, 1] - here[after, 1]
                 value[c] = dx * dx + dy * dy - rest[e, c]
-                by[c, before, 0], by[c, before, 1] = 2 * dx, 2 * dy
-                by[c, after, 0], by[c, after, 1] = -2 * dx, -2 * dy
+                by[c, before, 0], by[c, before, 1], by[c, after, 0], by[c, after, 1] = 2 * dx, 2 * dy, -2 * dx, -2 * dy
         else:
             ratio = max(area / rest[e, 0], LEAST_AREA_RATIO)
-            _rubber(here, slopes[e], ratio, growth / rest[e, 0], law[e], kind == 3, value, by)
+            _rubber(here, slopes[e], rest[e, 0], ratio, growth, law[e], kind == 3, value, by)
         for a in range(size):
             for b in range(size):
                 value[a] += compliance[e, a, b] * multipliers[e, b]
@@ -99,7 +100,8 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
         for a in range(size):  # elimination: the matrix is positive
             for b in range(a + 1, size):
                 factor = matrix[b, a] / matrix[a, a]
-                matrix[b] -= factor * matrix[a]
+                for c in range(a, size):
+                    matrix[b, c] -= factor * matrix[a, c]
                 value[b] -= factor * value[a]
         for a in range(size - 1, -1, -1):
             for b in range(a + 1, size):
@@ -148,16 +150,15 @@ class ExtendedPositionBased(Textbook):
         if one.kind == "compressible":
             law = np.column_stack([values["shear"], values["bulk"]]) / values["bulk"][:, None]
         parts = rest, values.get("rest_slope", np.zeros((0, 3, 2))), law, one.compliance / float(self.h) ** 2
-        return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.dtype) for part in parts)
+        return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.dtype, "C") for part in parts)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions."""
-        springs = self.weights, self.springs, self.lengths, np.ones_like(self.lengths), self.compliance
-        pulls = np.zeros_like(self.lengths)
+        whole, pulls = np.ones_like(self.lengths), np.zeros_like(self.lengths)
         groups = [(*one, np.zeros(one[-1].shape[:2], self.dtype)) for one in self.groups]
         rounds, each = (self.iterations, 1) if groups else (1, self.iterations)
         for _ in range(rounds):
-            project_springs(y, *springs, pulls, each)
+            project_springs(y, self.weights, self.springs, self.lengths, whole, self.compliance, pulls, each)
             for group in groups:
                 _project_cells(y, self.weights, *group)
         return y
