@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh.cells import DIAGONALS, SIDES, pieces
+from ..mesh.cells import DIAGONALS, SIDES
+
+CELLS_AT_ONCE = 100_000  # most cells whose forces and couplings are computed together
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -73,14 +75,14 @@ class Energy(ABC):
     def forces(self, displacements: np.ndarray) -> np.ndarray:
         """Derivative of the energy by the corners' positions [m], shape (n_cells, m, 2)."""
         field = np.asfortranarray(displacements)
-        parts = [part._forces(part._at_corners(field)) for part in self._parts]
+        parts = [part._forces(part._at_corners(field)) for _, part in self._parts]
         return np.concatenate(parts, axis=-1).transpose(2, 1, 0)
 
     def couplings(self, displacements: np.ndarray | None = None) -> np.ndarray:
         """Return tangent blocks of pairs of corners [1], (n_pairs, 2, 2, n_cells), as `Mesh.cell_edges` orders them."""
         field = np.asfortranarray(np.zeros(self.points.shape) if displacements is None else displacements)
         blocks = np.empty((len(self._pairs), 2, 2, len(self.corners)))
-        for rows, part in zip(pieces(len(self.corners)), self._parts):
+        for rows, part in self._parts:
             blocks[..., rows] = part._couplings(part._at_corners(field))
         return blocks
 
@@ -120,12 +122,13 @@ class Energy(ABC):
         return SIDES[self.corners.shape[1]] + DIAGONALS[self.corners.shape[1]]
 
     @cached_property
-    def _parts(self) -> list["Energy"]:
-        """Energies of some cells each, see `pieces`."""
+    def _parts(self) -> list[tuple[slice, "Energy"]]:
+        """Energies of `CELLS_AT_ONCE` cells each, with their rows: fields of millions of cells take gigabytes."""
+        if (count := len(self.corners)) <= CELLS_AT_ONCE:
+            return [(slice(count), self)]
         own = {one.name: value for one in fields(self)[1:] if np.ndim(value := getattr(self, one.name))}
-        slices = pieces(len(self.corners))
-        split = len(slices) > 1
-        return [replace(self, **{n: value[part] for n, value in own.items()}) for part in slices] if split else [self]
+        parts = [slice(start, start + CELLS_AT_ONCE) for start in range(0, count, CELLS_AT_ONCE)]
+        return [(rows, replace(self, **{name: value[rows] for name, value in own.items()})) for rows in parts]
 
     @cached_property
     def _rest(self) -> np.ndarray:

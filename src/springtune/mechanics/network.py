@@ -18,7 +18,7 @@ from scipy.sparse import csc_array
 
 from ..linalg import SOLVERS
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
-from ..mesh.cells import Mesh, pieces
+from ..mesh.cells import Mesh
 from ..mesh.sheets import check_held
 from .energies import Energy
 from .pattern import Pattern
@@ -45,8 +45,6 @@ def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool
     most = MOST_CHOLESKY_UNKNOWNS if direct else NO_CHOLESKY_FROM_UNKNOWNS
     return ("Cholesky" if direct else "SuperLU") if solver is None and unknowns <= most else None
 
-
-ALL = slice(None)
 
 NO_STIFFNESS = 1e-12  # stiffness of a spring or a motion, over the stiffest spring, that counts as zero
 
@@ -118,9 +116,9 @@ class Network:
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths
 
-    def end_differences(self, displacements: np.ndarray, part: slice = ALL) -> np.ndarray:
+    def end_differences(self, displacements: np.ndarray) -> np.ndarray:
         """Difference of the displacements of each spring's ends [m], shape (n_springs, 2)."""
-        return displacements.take(self.second[part], axis=0) - displacements.take(self.first[part], axis=0)
+        return displacements.take(self.second, axis=0) - displacements.take(self.first, axis=0)
 
     def gather(self, forces: np.ndarray) -> np.ndarray:
         """Unknowns' share of spring forces, shape (n_springs, 2), that pull the first end towards the second."""
@@ -141,22 +139,19 @@ class Network:
             total += self._pattern.sum_cells(energy.corners, energy.forces(displacements))
         return total
 
-    def _spring_vectors(self, displacements: np.ndarray, part: slice = ALL) -> tuple[np.ndarray, ...]:
+    def _spring_vectors(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return each spring's vector [m], length [m] and growth of the squared length [m2], without cancellation."""
-        relative, rest = self.end_differences(displacements, part), self.rest_vectors[part]
-        vectors = rest + relative
-        squares = np.einsum("ij,ij->i", rest + vectors, relative)
+        relative = self.end_differences(displacements)
+        vectors = self.rest_vectors + relative
+        squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
         return vectors, np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), squares
 
     def _end_forces(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force of each spring on its first end over k [m], shape (n_springs, 2)."""
-        forces = np.empty(self.rest_vectors.shape)
-        for part in pieces(len(forces)):
-            vectors, lengths, squares = self._spring_vectors(displacements, part)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                pull = self.stiffness[part] * squares / ((lengths + self.rest_lengths[part]) * lengths)
-            np.multiply(pull[:, None], vectors, out=forces[part])
-        return forces
+        vectors, lengths, squares = self._spring_vectors(displacements)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
+        return pull[:, None] * vectors
 
     def spring_forces_over_k(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
         """Return axial spring forces over k, tension positive [m]; energies are left out."""

@@ -16,8 +16,6 @@ SIDES = {3: ((1, 2), (2, 0), (0, 1)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
 
 DIAGONALS = {3: (), 4: ((0, 2), (1, 3))}  # corners that are joined across a cell
 
-ROWS_AT_ONCE = 100_000  # most rows of springs or cells that are computed together
-
 
 def no_cells(corners: int) -> np.ndarray:
     """Corner indices of no cells, shape (0, corners)."""
@@ -239,9 +237,8 @@ class Mesh:
         bool
         """
         return any(
-            (signed_areas(points, corners[part][:, [i - 1, i, (i + 1) % count]]) <= 0).any()
+            (signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) <= 0).any()
             for count, corners in self.cells.items()
-            for part in pieces(len(corners))
             for i in range(1 if count == 3 else count)
         )
 
@@ -290,11 +287,6 @@ def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     numbers = numbers.ravel()
     places[numbers[: len(cells)]] = np.arange(len(cells))
     return places[numbers[len(cells) :]]
-
-
-def pieces(count: int) -> list[slice]:
-    """Slices of so many rows, `ROWS_AT_ONCE` each: intermediate results of millions take gigabytes, and longer."""
-    return [slice(start, start + ROWS_AT_ONCE) for start in range(0, max(count, 1), ROWS_AT_ONCE)]
 
 
 def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
