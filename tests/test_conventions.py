@@ -12,7 +12,6 @@ import yaml
 
 REPOSITORY = Path(__file__).parents[1]
 SOURCE = REPOSITORY / "src/springtune"
-PARSED = {path: ast.parse(path.read_bytes()) for path in sorted(SOURCE.rglob("*.py"))}
 
 
 def test_imports_keep_the_contracts_of_pyproject():
@@ -24,8 +23,8 @@ def test_imports_keep_the_contracts_of_pyproject():
 def test_modules_are_imported_by_text_in_one_place():
     """import-linter cannot read such imports: all of them go through `springtune.registry`."""
     names = {"import_module", "__import__", "exec", "eval"}
-    for path, tree in PARSED.items():
-        used = {getattr(node, one, "") for node in ast.walk(tree) for one in ("id", "attr")}
+    for path in sorted(SOURCE.rglob("*.py")):
+        used = {getattr(node, one, "") for node in ast.walk(ast.parse(path.read_bytes())) for one in ("id", "attr")}
         assert not names & used or path.relative_to(SOURCE) == Path("registry.py"), path
 
 

@@ -13,8 +13,6 @@ from hypothesis import strategies as some
 import springtune as st
 from springtune.units import QUANTITY_DIMENSIONS, parse
 
-REGISTRY = pint.UnitRegistry()
-
 QUANTITIES = yaml.safe_load(Path(__file__).with_name("units.yaml").read_text())
 USUAL = [(kind, unit) for kind, one in QUANTITY_DIMENSIONS.items() for unit in one.units]
 
@@ -24,9 +22,14 @@ def test_reads_quantities(text, kind, value):
     assert parse(text, kind) == value
 
 
+@pytest.fixture(scope="module")
+def registry():
+    return pint.UnitRegistry()
+
+
 @pytest.mark.parametrize(("kind", "unit"), USUAL)
-def test_table_agrees_with_pint(kind, unit):
-    theirs = REGISTRY.Quantity(1.0, unit).to(QUANTITY_DIMENSIONS[kind].unit).magnitude
+def test_table_agrees_with_pint(registry, kind, unit):
+    theirs = registry.Quantity(1.0, unit).to(QUANTITY_DIMENSIONS[kind].unit).magnitude
     assert math.isclose(parse(f"1 {unit}", kind), theirs, rel_tol=1e-9)
 
 

@@ -22,7 +22,7 @@ from synthetic import small, written
 from tables import STUDIES, run
 
 REPOSITORY = Path(__file__).parents[2]
-TABLE = yaml.safe_load(Path(__file__).with_name("commands.yaml").read_text())
+TABLE = yaml.load(Path(__file__).with_name("commands.yaml").read_text(), yaml.CSafeLoader)
 ANSWERED = TABLE.pop("answered")
 
 

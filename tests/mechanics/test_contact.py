@@ -177,7 +177,7 @@ def test_other_ways_to_lay(loading):
 
 
 def test_rigid_is_the_limit_of_stiff():
-    rigid, stiff = (lay(STRIP, TRAPEZOID, RUBBER, STEEL, "delingette", 2e-3, rigid=ratio) for ratio in (1e4, 1e9))
+    rigid, stiff = (lay(STRIP, TRAPEZOID, RUBBER, STEEL, "delingette", 3e-3, rigid=ratio) for ratio in (1e4, 1e9))
     assert "rigid" in rigid.skipped and "rigid" not in stiff.skipped
     assert stiff.message == ""
     assert stiff.area_under_strip == pytest.approx(rigid.area_under_strip, rel=1e-3)
@@ -185,7 +185,7 @@ def test_rigid_is_the_limit_of_stiff():
 
 def test_a_strip_that_cannot_be_laid_keeps_its_last_good_step():
     """Pressed with ten times its own modulus the strip's triangles turn inside out."""
-    laid = lay(STRIP, TRAPEZOID, RUBBER, STEEL, "uniform", 2e-3, pressure=10e6)
+    laid = lay(STRIP, TRAPEZOID, RUBBER, STEEL, "uniform", 3e-3, pressure=10e6)
     assert 0 < laid.load_share < 1
     assert f"no equilibrium beyond {100 * laid.load_share:.3g} % of the load" in laid.message
     assert np.isfinite(laid.outline).all()
@@ -317,7 +317,7 @@ def test_a_force_along_the_floor_slips_at_the_limit():
         contact.solve(first=1.0)
         return contact
 
-    for share in (0.5, 0.95, 0.99):
+    for share in (0.5, 0.99):
         contact = loaded(share * 0.3)
         assert contact.contact_force() == pytest.approx([-share * 0.3 * 0.02, 0.02], rel=1e-4)
         # Regularised: what holds is a slip of SLIP * share / sqrt(1 - share^2) and the block's own shear.

@@ -137,7 +137,7 @@ DAMPINGS = {
 @pytest.mark.parametrize("integrator", EXPLICIT)
 def test_limit_of_the_step_is_within_one_percent(integrator, damping, linear):
     """Below it 4,000 steps from noise stay bounded; above it they diverge."""
-    motion = beam("delingette" if damping == "energies" else "lattice", force=0.0, linear=linear)
+    motion = beam("delingette" if damping == "energies" else "lattice", force=0.0, size=0.01, linear=linear)
     motion = with_(motion, **DAMPINGS[damping](motion))
     noise = 1e-7 * np.random.default_rng(0).standard_normal(motion.load.shape) * ~motion.network.held
     limit = motion.step_limit(integrator)
@@ -204,7 +204,7 @@ def modes(motion):
 
 
 @pytest.mark.parametrize("linear", [True, False])
-@pytest.mark.parametrize("damping, number", [("mass", 0), ("springs", 0), ("both", 0), ("both", 3)])
+@pytest.mark.parametrize("damping, number", [("mass", 0), ("springs", 0), ("both", 3)])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_free_decay_of_a_mode(integrator, damping, number, linear):
     """A mode let go at a damping ratio of 0.2, after one period 2 pi / (omega sqrt(1 - xi^2)).
@@ -346,11 +346,17 @@ def test_a_standing_wave_on_a_chain_has_its_closed_form(linear, precision, error
     assert np.abs(found.displacements - swing * shape).max() <= error * 1e-7
 
 
+@cache
+def threaded():
+    """A beam whose springs are enough for three threads."""
+    return beam(mesh_type="free", size=6e-4)
+
+
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 @pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("linear", [False, True])
 def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, precision):
-    motion = beam(mesh_type="free", size=6e-4, linear=linear, mass_damping=20.0)
+    motion = with_(threaded(), linear=linear, mass_damping=20.0)
     step = 0.5 * motion.step_bound("symplectic-euler")
     assert len(motion.network.mesh.edges) >= 3 * stepping.LEAST_ENTRIES_A_THREAD
     if damped:

@@ -50,7 +50,7 @@ def rows(table, first=1):
 
 NODES, CPS4, CPS3 = rows(POINTS), rows(QUADS), rows(TRIANGLES, 5)
 MESH = f"*NODE\n{NODES}*ELEMENT, TYPE=CPS4\n{CPS4}*ELEMENT, TYPE=CPS3\n{CPS3}"
-ROWS = yaml.safe_load(Path(__file__).with_name("mesh_files.yaml").read_text())
+ROWS = yaml.load(Path(__file__).with_name("mesh_files.yaml").read_text(), yaml.CSafeLoader)
 SIDES, PARTS = ROWS["sides"], ROWS["parts"]
 SETS = SIDES + PARTS
 INP = f"*HEADING\nplate\n{MESH}{SETS}"

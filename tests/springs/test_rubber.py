@@ -155,7 +155,7 @@ STRAINS = {
     "almansi": lambda q: (1 - q**-2) / 2,
 }
 POINTS_OF = {"far": FAR, "near": NEAR, "pressed": PRESSED, "small": SMALL, "tiny": 1 + (NEAR - 1) / 100}
-HEADS = yaml.safe_load(Path(__file__).with_name("heads.yaml").read_text())
+HEADS = yaml.load(Path(__file__).with_name("heads.yaml").read_text(), yaml.CSafeLoader)
 
 
 def written_out(heads):

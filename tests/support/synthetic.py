@@ -11,7 +11,7 @@ import springtune as st
 from springtune.studies.kinds.bodies.collect import ROOT, SENSITIVITY
 from springtune.studies.output import dataset as stored
 
-GIVEN = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text())
+GIVEN = yaml.load(Path(__file__).with_suffix(".yaml").read_text(), yaml.CSafeLoader)
 LABELS = GIVEN["labels"]
 BEAMS, TYPES, SIZES, DEFINITIONS = (LABELS[name] for name in ("beam", "mesh_type", "mesh_size", "definition"))
 

@@ -12,6 +12,8 @@ import pytest
 
 REPOSITORY = Path(__file__).parents[2]
 
+collect_ignore = ["forks.py"]  # which has no examples, and imports Snakemake
+
 
 def called(command, folder, **environment):
     """Exit code and output of a module that is a program, in a folder."""

@@ -67,10 +67,10 @@ def test_the_linter_misses_environments_alone(run, repository):
     assert set(re.findall(r"\* (.*)", told)) == {"Specify a conda environment or container for each rule.:"}, told
 
 
-def test_the_small_study_of_the_catalog_runs_by_its_snakefile(repository, tmp_path):
+def test_the_small_study_of_the_catalog_runs_by_its_snakefile(repository, run_alone):
     """Called as there is, and as a module, as snakedeploy writes it."""
-    shutil.copytree(repository / ".test", tmp_path / "deployed")
-    beside = tmp_path / "deployed/Snakefile"
+    shutil.copytree(repository / ".test", run_alone.folder, dirs_exist_ok=True)
+    beside = run_alone.folder / "Snakefile"
     beside.write_text(f"""configfile: "config/config.yaml"
 module springtune:
     snakefile: {str(repository / "workflow/Snakefile")!r}
@@ -78,9 +78,8 @@ module springtune:
 use rule * from springtune
 """)
     for snakefile in (repository / "workflow/Snakefile", beside):
-        command = [sys.executable, "-m", "snakemake", "--snakefile", snakefile, "--dry-run"]
-        done = subprocess.run(command, cwd=tmp_path / "deployed", capture_output=True, text=True)
-        assert done.returncode == 0 and "results/config is complete" in done.stdout, done.stderr
+        code, told = run_alone.forked(["--snakefile", snakefile, "--dry-run"])
+        assert code == 0 and "results/config is complete" in told, told
     assert (repository / ".test/config/config.yaml").samefile(repository / "config/quick.yaml")
 
 

@@ -30,22 +30,19 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory, site):
-    """Folder in which a study that uses all of the example package has run."""
+    """Folder in which the jobs of a study that uses all of the example package have run, by one process."""
     folder = tmp_path_factory.mktemp("run")
-    for name in ("workflow", "profiles"):
-        shutil.copytree(REPOSITORY / name, folder / name)
-    shutil.copy(REPOSITORY / "Snakefile", folder)
     (folder / "config").mkdir()
     shutil.copy(PLUGIN / "even.yaml", folder / "config")
-    python(folder, site, "-m", "snakemake", "--snakefile", "Snakefile", "--cores", "2", "--configfile",
-           "config/even.yaml")  # fmt: skip
+    python(folder, site, "-c", "from campaigns import Campaign; Campaign('config/even.yaml').finish()")
     return folder
 
 
 def python(folder, *arguments, code=0):
     """Call Python in a folder, with what is installed in a site; return what it prints."""
     site, *arguments = arguments
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "src"), str(site)])}
+    places = (REPOSITORY / "src", REPOSITORY / "tests/support", site)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, places))}
     environment["SPRINGTUNE_PLUGINS"] = "all"
     command = [sys.executable, *map(str, arguments)]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
