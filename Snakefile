@@ -47,8 +47,8 @@ onstart:
 
 
 onsuccess:
-    end("ending")
+    end("success_report")
 
 
 onerror:
-    end("broken")
+    end("failure_report")

@@ -65,12 +65,12 @@ class Display:
 
     def line(self) -> str:
         """Numbers of jobs, elapsed and remaining time, and the rules of running jobs."""
-        gone, count = time.monotonic() - self.begun, self.counts["total"]
+        elapsed, count = time.monotonic() - self.begun, self.counts["total"]
         running, done, failed = self.jobs.values()
-        left = f", about {clock_text(gone * (count - len(done)) / len(done))} left" if 0 < len(done) < count else ""
+        left = f", about {clock_text(elapsed * (count - len(done)) / len(done))} left" if 0 < len(done) < count else ""
         lost = f", {len(failed)} failed" if failed else ""
         rules = dict.fromkeys(self.rules[number] for number in sorted(running))
-        head = f"{len(done)} of {count} jobs{lost}, {clock_text(gone)}{left}"
+        head = f"{len(done)} of {count} jobs{lost}, {clock_text(elapsed)}{left}"
         return ": ".join(filter(None, (head, ", ".join(rules) if self.moves else "")))
 
     def _move(self) -> None:
@@ -96,15 +96,15 @@ class LogHandler(LogHandlerBase):
         self.held: list[LogRecord] = []
         asked = self.common_settings
         quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()} & {"all", "progress", "rules"}
-        self.wanted = not (quiet or asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag)
-        if self.wanted and threading.current_thread() is threading.main_thread():
+        self.enabled = not (quiet or asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag)
+        if self.enabled and threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, end_quietly)
 
     def emit(self, record: LogRecord) -> None:
         """Show a record."""
         try:
             event = getattr(record, "event", None)
-            if not self.wanted:
+            if not self.enabled:
                 self.plain.emit(record)
             elif event == LogEvent.RUN_INFO and self.display is None:
                 self.held.clear()
@@ -113,7 +113,7 @@ class LogHandler(LogHandlerBase):
                 stream.write(f"{counts['total']} jobs\n")
                 self.display = Display(counts, stream, moves)
             elif getattr(record, "ends", False):
-                self.wanted = False  # what Snakemake says after it is shown
+                self.enabled = False  # what Snakemake says after it is shown
                 self._stop()
                 sys.stderr.write(f"{record.getMessage()}\n")
             elif self.display is None:
@@ -127,7 +127,7 @@ class LogHandler(LogHandlerBase):
                     self.display.write(above=lambda: self.plain.emit(record))
         except Exception:
             # If the display fails, the messages of the run must still appear.
-            self.wanted = False
+            self.enabled = False
             self._stop()
             self.plain.emit(record)
 

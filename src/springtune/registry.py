@@ -118,7 +118,7 @@ class ExtensibleMapping(Mapping[str, Entry]):
     def _enter(self, name: str, found: Any) -> None:
         """Add the entry of another package."""
         if name in self._entries:
-            raise ValueError(f"'{self.packages.get(name, 'springtune')}' has one of that name; it needs another")
+            raise ValueError(f"'{self.packages.get(name, 'springtune')}' has one of this name already; rename it")
         self._entries = self._entries | {name: self._adopt(name, found)}
 
     def _load(self, name: str = "") -> str:

@@ -48,7 +48,7 @@ def why_unreadable(path: str | Path) -> str:
 
 
 def read(path: str | Path, most: int) -> bytes:
-    """Return the content of a regular file of at most so many bytes."""
+    """Return the content of a regular file; refuse one that is larger than `most` bytes."""
     if why := why_unreadable(path):
         raise ValueError(why)
     try:
@@ -131,7 +131,7 @@ def number_of(text: object) -> float:
 
 
 def virtual_memory() -> int:
-    """Return the bytes that this process has mapped; 0 if the system does not tell."""
+    """Return the bytes that this process has mapped; 0 if the system does not report it."""
     try:
         with open("/proc/self/statm", "rb", buffering=0) as file:
             return int(file.read().split()[0]) * mmap.PAGESIZE
@@ -294,7 +294,7 @@ def write_json(path: str | Path, content: Any) -> None:
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
-UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff\ud800-\udfff]")
+UNSEEN_PATTERN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff\ud800-\udfff]")
 """Control characters, line breaks, bidirectional marks, surrogates and what is no character in XML."""
 
 PUNCTUATION = re.compile(r"([^\w\s]|_)")  # characters that a markup language may interpret
@@ -306,7 +306,7 @@ def shown(text: object) -> str:
     >>> print(shown("12 faults\x1b[2K\r0 faults\n"))
     12 faults\x1b[2K\r0 faults\n
     """
-    return UNSEEN.sub(lambda found: ascii(found[0])[1:-1], str(text))
+    return UNSEEN_PATTERN.sub(lambda found: ascii(found[0])[1:-1], str(text))
 
 
 def printable(text: object) -> str:
@@ -324,7 +324,7 @@ def json_line(text: str) -> str:
     >>> print(json_line('"one\u2028two"'))
     "one\u2028two"
     """
-    return UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return UNSEEN_PATTERN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def xml_comment(text: str) -> str:
@@ -399,12 +399,12 @@ def html_table(name: str, rows: Iterable[Sequence[object]], heads: Iterable[obje
     return f"<div><b>{escape(name)}</b><table>{table}</table></div>"
 
 
-WRAPPED = 30  # characters from which a cell may have several lines
+WRAP_CHARACTERS = 30  # characters from which a cell may have several lines
 
 
 def _cell(tag: str, content: object) -> str:
     text = shown(content)
-    space = "normal" if len(text) >= WRAPPED else "nowrap"  # notebooks have styles of their own
+    space = "normal" if len(text) >= WRAP_CHARACTERS else "nowrap"  # notebooks have styles of their own
     return f'<{tag} style="text-align: left; vertical-align: top; white-space: {space}">{escape(text)}</{tag}>'
 
 
@@ -453,7 +453,7 @@ class TabledList(list[One]):
 
 
 def clock(seconds: float) -> str:
-    """Readable duration.
+    """Duration as text, such as ``1:15 min``.
 
     >>> clock(3.4), clock(75), clock(7300)
     ('3 s', '1:15 min', '2:01 h')

@@ -53,7 +53,7 @@ QUANTITY_DIMENSIONS = {
 }
 """Dimensions of quantities by name."""
 
-_KNOWN = {
+_UNIT_SIZES = {
     unit: (dimension.name, Decimal(size))
     for dimension in QUANTITY_DIMENSIONS.values()
     for unit, size in dimension.units.items()
@@ -73,7 +73,7 @@ _OTHER_NUMBER = re.compile(r"\^|(?<![\w.])(?!1(?![\w.]))[\d.]")
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity of the wanted dimension; the message says why and what to write instead.
+    """A text is not a quantity of the expected dimension; the message says why and what to write instead.
 
     Public functions raise it as a plain ValueError that names the argument.
 
@@ -91,8 +91,8 @@ class UnitError(ValueError):
 
 def parse(text: str, dimension: str) -> float:
     """Return the number in SI units of a quantity; its number may be a fraction, such as 1/60."""
-    wanted = QUANTITY_DIMENSIONS[dimension]
-    remedy = f"give {wanted.words}"
+    expected = QUANTITY_DIMENSIONS[dimension]
+    remedy = f"give {expected.words}"
     if len(text) > LONGEST_QUANTITY:
         raise UnitError(f"'{text[:57]}...' is too long; {remedy}")
     found = _QUANTITY.fullmatch(text.strip())
@@ -103,12 +103,12 @@ def parse(text: str, dimension: str) -> float:
         raise UnitError(f"'{text}' has no unit; {remedy}")
     # Micro and squares are written in several ways.
     spelling = unicodedata.normalize("NFKC", unit.translate(_POWERS)).replace("μ", "u").replace("**", "^")
-    known = _KNOWN.get(spelling) or _ask_pint(spelling)
+    known = _UNIT_SIZES.get(spelling) or _ask_pint(spelling)
     if known is None and unit[0] == ",":
         raise UnitError(f"'{text}' has a comma: write a decimal point; {remedy}")
     if known is None:
-        same = [one for one in wanted.units if one.casefold() == unit.casefold()]
-        near = same or get_close_matches(unit, wanted.units, n=1, cutoff=0.5)
+        same = [one for one in expected.units if one.casefold() == unit.casefold()]
+        near = same or get_close_matches(unit, expected.units, n=1, cutoff=0.5)
         meant = f", did you mean '{near[0]}'?" if near else ";"
         raise UnitError(f"'{text}': unknown unit '{unit}'{meant} {remedy}")
     found_dimension, size = known

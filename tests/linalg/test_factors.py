@@ -11,13 +11,13 @@ from scipy.sparse import csc_array, csr_array
 
 import springtune as st
 from springtune.linalg import factors, kernels
-from springtune.linalg.factors import Analysis, SingularError, factorize, factorize_pinned, spread
+from springtune.linalg.factors import Analysis, SingularError, factorize, factorize_pinned, spread_particles
 from springtune.linalg.kernels import Blocks, row_pointers
-from springtune.linalg.multigrid import IndefiniteError, Multigrid, chunked, dense, first_grid, galerkin, next_grid
+from springtune.linalg.multigrid import IndefiniteError, Multigrid, as_dense, cut_rows, first_grid, galerkin, next_grid
 from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINS_FROM_UNKNOWNS, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
-from springtune.problem.boundary import held, weights
+from springtune.problem.boundary import held_directions, weights
 from springtune.problem.loads import AXIAL
 from springtune.springs.lattice import half_weight
 
@@ -28,7 +28,7 @@ FORCE_OVER_STIFFNESS = 2e-4
 
 def problem_on(mesh, stiffness=None, solver=None):
     stiffness = half_weight(mesh) if stiffness is None else stiffness
-    return StaticProblem(Network(mesh, held(mesh, AXIAL), stiffness, solver=solver), weights(mesh, AXIAL))
+    return StaticProblem(Network(mesh, held_directions(mesh, AXIAL), stiffness, solver=solver), weights(mesh, AXIAL))
 
 
 def both(function):
@@ -188,10 +188,10 @@ def test_a_stable_tangent_after_an_unstable_one_has_the_factor_that_it_always_ha
 
 def test_particles_that_are_spread_are_far_from_each_other():
     mesh = st.MESH_TYPES["free"](0.2, 0.04, 4e-3)
-    points = mesh.points[spread(mesh.points, 16)]
+    points = mesh.points[spread_particles(mesh.points, 16)]
     apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
     assert len(points) == 16 and apart.min() > 0.5 * (mesh.area / 16) ** 0.5
-    assert len(spread(points[:3], 8)) == 2
+    assert len(spread_particles(points[:3], 8)) == 2
 
 
 # -- multigrid ---------------------------------------------------------------------------------------------------------
@@ -205,7 +205,7 @@ def interpolation(grid):
     """Matrix from the displacements of a grid's nodes to those of its points."""
     count, nodes = len(grid.cells), grid.shape[0] * grid.shape[1]
     empty = Blocks(np.zeros(count + 1, int), np.zeros(0, int), np.zeros((0, 4)), np.zeros((count, 3)))
-    columns, rows = [], chunked(empty)
+    columns, rows = [], cut_rows(empty)
     for node in range(2 * nodes):
         coarse, fine = np.zeros((nodes, 2), np.float32), np.zeros((count, 2), np.float32)
         coarse.ravel()[node] = 1
@@ -255,8 +255,8 @@ def test_coarse_matrices_are_galerkins(seed, coarsening):
     points, matrix, full = scattered_blocks(np.random.default_rng(seed), 24)
     grid = first_grid(points, coarsening)
     prolong = interpolation(grid)
-    coarse, expected = dense(galerkin(matrix, grid)), prolong.T @ full @ prolong
-    assert dense(matrix) == pytest.approx(full, rel=1e-9)
+    coarse, expected = as_dense(galerkin(matrix, grid)), prolong.T @ full @ prolong
+    assert as_dense(matrix) == pytest.approx(full, rel=1e-9)
     assert np.abs(coarse - expected).max() <= 1e-6 * np.abs(expected).max()
 
 
@@ -321,7 +321,7 @@ LOOSE = beside(__file__)["LOOSE"]
 def loose(what):
     """Mesh, what is held, and springs with a motion without stiffness."""
     mesh = st.MESH_TYPES["right"](0.1, 0.04, 1.8e-3)
-    stiffness, fixed = half_weight(mesh), held(mesh, AXIAL)
+    stiffness, fixed = half_weight(mesh), held_directions(mesh, AXIAL)
     middle = np.linalg.norm(mesh.points - [0.05, 0.02], axis=1).argmin()
     ends = mesh.points[mesh.edges]
     if what == "springs in one line":

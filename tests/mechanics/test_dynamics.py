@@ -14,7 +14,7 @@ from springtune.mechanics.dynamics import Motion, masses, relax
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh.rows import lattice
-from springtune.problem.boundary import held, weights
+from springtune.problem.boundary import held_directions, weights
 from springtune.problem.loads import AXIAL, BENDING
 from springtune.springs.lattice import uniform
 
@@ -31,7 +31,7 @@ def beam(
     """A clamped beam of steel, pulled at its end, with its true masses."""
     mesh = st.MESH_TYPES[mesh_type](length, 0.02, size)
     springs = st.DEFINITIONS[definition].springs(mesh, STEEL, THICKNESS)
-    network = network_type(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
+    network = network_type(mesh, held_directions(mesh, AXIAL), springs.relative, springs.energies)
     inertia = masses(mesh, DENSITY, THICKNESS) / springs.reference
     return Motion(network, inertia, force / springs.reference * weights(mesh, AXIAL), **options)
 
@@ -436,7 +436,7 @@ def column(share, sideways=0.0, linear=False):
     """
     mesh = st.MESH_TYPES["braced"](0.1, 0.01, 5e-3)
     springs = st.DEFINITIONS["lattice"].springs(mesh, STEEL, THICKNESS)
-    network = Network(mesh, held(mesh, AXIAL), springs.relative)
+    network = Network(mesh, held_directions(mesh, AXIAL), springs.relative)
     euler = np.pi**2 * STEEL.young_modulus * THICKNESS * 0.01**3 / 12 / (4 * 0.1**2)
     along, across = weights(mesh, AXIAL), weights(mesh, BENDING)
     critical = buckling(StaticProblem(network, along), -euler / springs.reference).load

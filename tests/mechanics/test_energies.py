@@ -14,7 +14,7 @@ from springtune.mechanics import energies
 from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.newton import MOST_MODES
 from springtune.mechanics.statics import FAR_STRETCH
-from springtune.problem.boundary import measured
+from springtune.problem.boundary import measured_weights
 from springtune.problem.loads import FACE
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
@@ -289,7 +289,7 @@ def pressed(definition, length, height, size, nu=0.3, stiffness=None, mesh_type=
 
 def block(definition, nu=0.5, size=2e-3, **options):
     problem, mesh, reference = pressed(definition, 0.2, 0.04, size, nu, **options)
-    return problem, FORCE / reference, measured(mesh, FACE)
+    return problem, FORCE / reference, measured_weights(mesh, FACE)
 
 
 def column(definition, length, height, size, follower, mesh_type="structured"):

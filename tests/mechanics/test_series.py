@@ -9,7 +9,7 @@ import springtune as st
 from springtune.mechanics.continuation import follow, smallest_share
 from springtune.mechanics.series import StablePath
 from springtune.mechanics.statics import SERIES_ORDER, Expansion, StaticProblem
-from springtune.problem.boundary import held, measured, weights
+from springtune.problem.boundary import held_directions, measured_weights, weights
 from springtune.problem.compare import best_stiffness
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.reference.small_strain import solve_small_strain
@@ -77,7 +77,7 @@ def random_curve(seed):
         small = 1e-6 * sign * height
         critical = smallest_share(problem.network, None, small * problem.slope) * abs(small)
         s = critical * random.uniform(0.3, 1.8) if kind == AXIAL else min(0.3 * s, critical)
-    return problem, measured(mesh, kind), sign * min(s, 2 * height) / RATIOS
+    return problem, measured_weights(mesh, kind), sign * min(s, 2 * height) / RATIOS
 
 
 def check(seed):
@@ -169,7 +169,7 @@ def test_one_path_is_many_solves_worth():
     pattern = weights(mesh, kind)
 
     def problem():
-        return StaticProblem(CountedNetwork(mesh, held(mesh, kind), np.ones(len(mesh.edges))), pattern)
+        return StaticProblem(CountedNetwork(mesh, held_directions(mesh, kind), np.ones(len(mesh.edges))), pattern)
 
     loads = 2e4 / (0.866 * 2.1e8 * np.linspace(0.4, 1.6, 201))
     together, apart = problem(), [problem() for _ in loads[::50]]

@@ -9,8 +9,8 @@ import pytest
 import springtune as st
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
-from springtune.prediction.choices import USUAL_LOADS, predicted, references
-from springtune.problem.boundary import held, weights
+from springtune.prediction.choices import USUAL_LOADS, predictable_loads, references
+from springtune.problem.boundary import held_directions, weights
 
 from problems import pulled
 from tables import slow_but
@@ -27,7 +27,7 @@ def springs_of(choice, mesh, beam, material):
 def solved(mesh, beam, springs, load):
     """Displacement of a load of 1 N [m] by dense matrices; None where the network is not positive definite."""
     kind = st.LOADS[load].kind
-    network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
+    network = Network(mesh, held_directions(mesh, kind), springs.relative, springs.energies)
     pattern = weights(mesh, kind)
     tangent = network.tangent().toarray()
     try:
@@ -206,8 +206,8 @@ class TestWhatScenesSay:
         """Bending of one row of cells is too stiff by much, but never by all of it."""
         beam, material = st.Beam("200 mm", height), st.Material("210 GPa", 0.3)
         mesh = st.make_mesh(beam, mesh_type, "8 mm")
-        choices = st.predict(beam, mesh, material, loads=predicted())
-        assert compared(beam, mesh, material, choices, predicted()) >= 3 * len(predicted())
+        choices = st.predict(beam, mesh, material, loads=predictable_loads())
+        assert compared(beam, mesh, material, choices, predictable_loads()) >= 3 * len(predictable_loads())
         assert all(one.failures or one.errors["bending"] > -1 for one in choices)
 
     def test_of_random_beams(self):
@@ -215,7 +215,7 @@ class TestWhatScenesSay:
         random, count = np.random.default_rng(14), 0
         for number in range(4):
             aspect, material, *_ = random_case(random)
-            load = predicted()[number % len(predicted())]
+            load = predictable_loads()[number % len(predictable_loads())]
             one = references(st.Beam(aspect, 1.0, 1.0), st.Material(1.0, material.poisson_ratio), [load])[load]
             for largest in (1000, *4 * (200,)):
                 beam, mesh_type, size = random_mesh(random, aspect, largest)
@@ -258,7 +258,7 @@ def seeded(seed):
         shape = st.Shape.rectangle(length, height, holes=[hole], loads={"pull": pulled("10 N", "5 N", components="xy")})
         return shape, st.mesh_shape(shape, size), material, {"load": "pull"}
     beam, mesh_type = st.Beam(length, height, 1e-3), list(st.MESH_TYPES)[seed % len(st.MESH_TYPES)]
-    loads = [str(one) for one in random.choice(predicted(), random.integers(1, 4), replace=False)]
+    loads = [str(one) for one in random.choice(predictable_loads(), random.integers(1, 4), replace=False)]
     return beam, st.MESH_TYPES[mesh_type](length, height, size), material, {"loads": loads}
 
 

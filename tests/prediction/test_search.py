@@ -5,7 +5,7 @@ import pytest
 
 import springtune as st
 from counting import counted
-from springtune.prediction.choices import in_order, predicted
+from springtune.prediction.choices import predictable_loads, sort_by_error
 from springtune.prediction.search import FINER_SIZES, asked_error
 from springtune.scene.mesh_cache import MeshCache
 
@@ -149,7 +149,7 @@ class TestBetweenWholeDivisions:
         for _ in range(20):
             aspect, nu = np.exp(random.uniform(0, np.log(10))), random.uniform(0, 0.49)
             beam, material = st.Beam(0.1 * aspect, 0.1), st.Material("210 GPa", nu)
-            loads = [str(name) for name in random.permutation(predicted())[: random.integers(1, 4)]]
+            loads = [str(name) for name in random.permutation(predictable_loads())[: random.integers(1, 4)]]
             error, types = float(random.choice([0.005, 0.01, 0.02, 0.05])), list(random.permutation([*st.MESH_TYPES]))
             search = st.find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
             for one in found_in(search):
@@ -188,7 +188,7 @@ class TestTies:
 
     def test_what_is_next_to_equal_is_equal(self):
         worst = {"b": 1e-15, "a": 9e-7, "c": 0.0, "d": 2.1e-6, "e": np.inf, "f": 2e-6}
-        assert "".join(in_order("fedcba", worst.get, str, 1e-6)) == "abcdfe"
+        assert "".join(sort_by_error("fedcba", worst.get, str, 1e-6)) == "abcdfe"
 
 
 class TestWhatIsNotFound:

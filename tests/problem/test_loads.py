@@ -4,7 +4,7 @@ import pytest
 
 import springtune as st
 from springtune.problem import loads
-from springtune.problem.loads import AXIAL, BENDING, BOTH, BOTTOM, FACE, LEFT, LOAD_KINDS, OWN_LOADS, RIGHT, SHEAR, TOP
+from springtune.problem.loads import AXES, AXIAL, BENDING, BOTTOM, FACE, LEFT, LOAD_KINDS, OWN_LOADS, RIGHT, SHEAR, TOP
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.mesh_cache import MeshCache
@@ -13,8 +13,8 @@ from springtune.studies.runs import plan, store
 from campaigns import do_stages, load_text
 from tables import STUDIES
 
-LIFT = loads.LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
-BUILT_IN = loads.LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
+LIFT = loads.LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, AXES),))
+BUILT_IN = loads.LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, AXES), (RIGHT, AXES)), pressed=True)
 
 BEAM, FORCE = st.Beam(0.1, 0.02, 1e-3, "100x20"), 50.0
 CORK = st.Material(1e9, 0.0, name="cork")
@@ -48,11 +48,11 @@ def test_properties(kind):
 
 
 def test_half_models_hold_what_symmetry_asks_for():
-    assert AXIAL.half_held == ((LEFT, BOTH), (BOTTOM, (1,)))
-    assert BENDING.half_held == ((LEFT, BOTH), (BOTTOM, (0,)))
-    assert SHEAR.half_held == ((BOTTOM, BOTH), (TOP, (1,)), (RIGHT, (1,)))
-    assert FACE.half_held == ((BOTTOM, BOTH), (RIGHT, (0,)))
-    assert BUILT_IN.half_held == ((LEFT, BOTH), (RIGHT, (0,)))
+    assert AXIAL.half_held == ((LEFT, AXES), (BOTTOM, (1,)))
+    assert BENDING.half_held == ((LEFT, AXES), (BOTTOM, (0,)))
+    assert SHEAR.half_held == ((BOTTOM, AXES), (TOP, (1,)), (RIGHT, (1,)))
+    assert FACE.half_held == ((BOTTOM, AXES), (RIGHT, (0,)))
+    assert BUILT_IN.half_held == ((LEFT, AXES), (RIGHT, (0,)))
 
 
 @pytest.mark.parametrize("mesh_type", ["structured", "right", "free"])
@@ -106,7 +106,7 @@ def test_supports_of_a_new_kind_are_the_same_everywhere(material):
 
 
 def test_a_kind_whose_supports_are_not_symmetric_has_no_half_model():
-    one_sided = loads.LoadKind("one-sided", loaded=TOP, axis=1, held=((LEFT, BOTH),))
+    one_sided = loads.LoadKind("one-sided", loaded=TOP, axis=1, held=((LEFT, AXES),))
     assert not one_sided.mirrored
     with pytest.raises(ValueError, match="not symmetric"):
         solve_small_strain(BEAM, CORK, FORCE, kind=one_sided)

@@ -12,7 +12,7 @@ from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, Me
 from skfem.models.elasticity import linear_elasticity
 
 import springtune as st
-from springtune.problem.loads import AXIAL, BENDING, BOTH, FACE, LEFT, LOAD_KINDS, RIGHT, SHEAR, TOP, LoadKind
+from springtune.problem.loads import AXES, AXIAL, BENDING, FACE, LEFT, LOAD_KINDS, RIGHT, SHEAR, TOP, LoadKind
 from springtune.reference import answers, small_strain
 from springtune.reference.small_strain import FIRST_LEVEL, UnitLevel, solve_small_strain, solve_unit
 
@@ -150,7 +150,7 @@ def test_rounding_of_slender_cantilevers_is_bounded(aspect_ratio, nu, degree):
         assert abs(level.displacement / exact - 1) <= level.round_off + 1e-7 / aspect_ratio**3 + 1e-9
 
 
-BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
+BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, AXES), (RIGHT, AXES)), pressed=True)
 
 
 @pytest.mark.parametrize(("kind", "nu"), [(BENDING, -0.5), (SHEAR, 0.3), (BUILT_IN, 0.3)], ids=str)

@@ -100,7 +100,7 @@ def test_springtune_run_makes_missing_what_snakemake_cannot_see(changed):
     """Snakemake runs jobs whose record is missing or was of another digest, and those that come after them."""
     run = driver.Run()
     due = run.due()
-    for record in plan.outdated(run.study, run.folder) or ():
+    for record in plan.outdated_records(run.study, run.folder) or ():
         record.unlink()
     seen = [name for name, job in run.jobs.items() if read_note(job.record).get("digest") != job.digest]
     after = set(seen)

@@ -156,7 +156,7 @@ def test_columns_are_positive_along_the_load(tmp_path, load):
     write(path, "force [N],displacement [um]", [0.0, 100.0, 200.0, 300.0], [0.0, 1.0, 2.0, 3.1])
     assert st.identify(st.MeasuredTest(BEAM, load, path), known={"nu": 0.3}).values["E"] > 0
     write(path, "force [N],displacement [um]", [0.0, 100.0, 200.0, 300.0], [0.0, -1.0, -2.0, -3.1])
-    with pytest.raises(TestDataError, match="displacement of .*c.csv.*: runs against the load"):
+    with pytest.raises(TestDataError, match="displacement of .*c.csv.*: is opposite to the load"):
         st.identify(st.MeasuredTest(BEAM, load, path), known={"nu": 0.3})
 
 

@@ -187,5 +187,5 @@ def end(how):
         if isinstance(thread, threading.Timer):  # Snakemake's, to look for jobs to start: it would hold up the end
             thread.cancel()
     text = getattr(summary, how)(*plan.STUDIES_READ[0], BEGUN)
-    text += "".join(summary.beside(*one, BEGUN) for one in plan.STUDIES_READ[1:])
+    text += "".join(summary.other_study_report(*one, BEGUN) for one in plan.STUDIES_READ[1:])
     logger.info(text, extra={"ends": True})

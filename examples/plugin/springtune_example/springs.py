@@ -4,10 +4,10 @@ import numpy as np
 
 from springtune.mesh.cells import Mesh, mesh_type
 from springtune.mesh.rows import right
-from springtune.problem.loads import BOTH, BOTTOM, TOP, Load, LoadKind
+from springtune.problem.loads import AXES, BOTTOM, TOP, Load, LoadKind
 from springtune.springs import Springs, definition
 
-LIFT = Load(LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),)), 1.0)
+LIFT = Load(LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, AXES),)), 1.0)
 """The upper side is pulled up, the lower one is clamped."""
 
 

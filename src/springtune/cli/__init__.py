@@ -13,7 +13,7 @@ import click
 
 from .. import __version__
 from ..registry import import_name
-from ..safe_io import UNSEEN, shown
+from ..safe_io import UNSEEN_PATTERN, shown
 from ..studies.runs.source import is_source_tree
 
 
@@ -105,7 +105,7 @@ class EscapedStream:
 
     def write(self, text: str) -> int:
         """Write a text, and return its length."""
-        self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
+        self._stream.write(UNSEEN_PATTERN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
         return len(text)
 
 
@@ -132,8 +132,8 @@ class Commands(click.Group):
         except ValueError as error:
             lines = error.args if all(isinstance(one, str) for one in error.args) else (str(error),)
             command = self.get_command(ctx, ctx.invoked_subcommand or "")
-            said = "\n".join(shown(name_option(line, command)) for line in lines)
-            raise (WrongCall if said.startswith("--") else click.ClickException)(said) from None
+            message = "\n".join(shown(name_option(line, command)) for line in lines)
+            raise (WrongCall if message.startswith("--") else click.ClickException)(message) from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands."""
@@ -169,14 +169,14 @@ def main() -> None:
     `springtune run` runs a study by Snakemake. `springtune COMMAND --help` ends with examples. Exit codes: 0 done, 1
     failed, 2 wrong options or arguments.
     """
-    usual, said = warnings.showwarning, set[str]()
+    usual, printed = warnings.showwarning, set[str]()
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
         # By name: importing them would let --help wait.
         if category.__name__ not in ("AssumptionWarning", "PluginWarning"):
             usual(message, category, *where, **further)
-        elif (line := f"warning: {shown(message)}") not in said:
-            said.add(line)
+        elif (line := f"warning: {shown(message)}") not in printed:
+            printed.add(line)
             click.echo(line, err=True)
 
     warnings.showwarning = show

@@ -57,17 +57,17 @@ def check_option_pairs() -> None:
     known = {one.name or "": one.opts[0] for one in context.command.params}
     given = [name for name in known if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     for name in given:
-        said = f"{known[name]}: '{context.params[name]}'"
+        option = f"{known[name]}: '{context.params[name]}'"
         for other in given:
             if name in EXCLUDED_OPTIONS.get(other, ()):
                 beside = f"{known[other]} {context.params[other]}"
-                raise ValueError(f"{said} means nothing beside {beside}; leave one of the two out")
+                raise ValueError(f"{option} cannot be combined with {beside}; leave one of the two out")
         for other in REQUIRED_OPTIONS.get(name, ()):
             if other in known and other not in given:
-                raise ValueError(f"{said} means nothing without {known[other]}; give {known[other]}, or leave it out")
+                raise ValueError(f"{option} needs {known[other]}; give {known[other]}, or leave it out")
 
 
-MISSING = {
+MISSING_TEXTS = {
     "beam": f"beam: missing; give one such as 200x40, or --study such as {STUDY_EXAMPLE}",
     "size": "size: missing; give the length of an edge such as '2 mm'",
     "material": f"material: missing; give one of {', '.join(MATERIALS)}, or --young and --poisson",
@@ -148,15 +148,15 @@ class BodyOptions:
 
 
 def read_body(
-    given: Mapping[str, Any], load: str | None, sized: bool = True, also: Collection[str] = ()
+    given: Mapping[str, Any], load: str | None, sized: bool = True, further: Collection[str] = ()
 ) -> BodyOptions:
-    """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size; a beam `also` more."""
+    """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size; `further`: a beam's."""
     if given["study"]:
         return _read_shape_options(given, load, sized)
-    needed = {"beam", "material", *also, *(() if not sized or Path(given["mesh"] or "").is_file() else ("size",))}
+    needed = {"beam", "material", *further, *(() if not sized or Path(given["mesh"] or "").is_file() else ("size",))}
     constants = None if None in (given["young"], given["poisson"]) else "of one's own"
     there = {**given, "material": given["material"] or constants}
-    if missing := [text for name, text in MISSING.items() if name in needed and there[name] is None]:
+    if missing := [text for name, text in MISSING_TEXTS.items() if name in needed and there[name] is None]:
         raise ValueError(*missing)  # each is a line
     from ..mesh.cells import MESH_TYPES
     from ..scene.single import make_mesh, read_mesh
@@ -200,7 +200,7 @@ def _read_shape_options(given: Mapping[str, Any], load: str | None, sized: bool)
             raise ValueError(f"density: '{density}' {why}; give theirs there")
         materials |= {name: replace(one, density=density) for name, one in materials.items() if one.density is None}
     if given["size"] is None and sized and not shape.file:
-        raise ValueError(MISSING["size"])
+        raise ValueError(MISSING_TEXTS["size"])
     size = None if given["size"] is None else positive(given["size"], "length", "size")
     files = shapes.files[shape.name]
     if shape.file and (size is not None or sized and len(files) > 1):
@@ -250,7 +250,7 @@ Options = dict[str, dict[str, Any]]  # options of a command by name, with keywor
 
 BODY_OPTIONS: Options = {
     "beam": {"help": "Length x height in mm, such as 200x40."},
-    "study": {"help": f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}; the name only of several."},
+    "study": {"help": f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}; without a name its only one."},
     "thickness": {"default": "1 mm", "show_default": True, "help": "Thickness of a beam."},
 }
 """Options of a body."""
@@ -262,9 +262,9 @@ def sheet_options(
     """Decorator that adds options of a body, its mesh and its material to a command, which gets them in `sheet`."""
     each = BODY_OPTIONS | {
         "mesh": {"default": mesh_type, "show_default": True, "help": mesh_help},
-        "size": {"help": "Length of an edge, such as '2 mm'; of mesh files only if a shape has several."},
+        "size": {"help": "Length of an edge, such as '2 mm'. It also chooses among several mesh files of a shape."},
         "unit": {"default": "1 m", "show_default": True, "help": "Unit of the coordinates in a beam's mesh file."},
-        "material": {"help": f"One of {', '.join(MATERIALS)}, or --young and --poisson; of a shape one of its study."},
+        "material": {"help": f"One of {', '.join(MATERIALS)}, or --young and --poisson; of a shape, one of its study."},
         "young": {"help": "Young's modulus, such as '210 GPa'."},
         "poisson": {"help": "Poisson's ratio, above -1 and at most 0.5."},
         "plane": {

@@ -28,7 +28,7 @@ ENGINE_OPTIONS: options.Options = {
     "precision": {"help": "float64 or float32.  [default: the engine's own]"},
     "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
     "scale": {"type": float, "default": 1.0, "help": "Factor on the load of a shape.  [default: 1]"},
-    "definition": {"help": "Rule for stiffness.  [default: best]"},
+    "definition": {"help": "Definition of the stiffness.  [default: the best]"},
 }
 """Options of `predict` that are of engines, as click takes them."""
 
@@ -84,7 +84,7 @@ Answer = tuple[str, Callable[[], "SpringNet"]]
     "compression, bending, shear and pressure, such as traction,bending; with --engine the first is calibrated to.  "
     "[default: traction,bending,shear; after the first with --engine all]",
 )
-@click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
+@click.option("--springs-alone", is_flag=True, help="Recommend definitions of springs alone, without energies.")
 @options.add_options(ENGINE_OPTIONS)
 @options.target_option("--write", "Write the springs of what is recommended to a file")
 def predict(
@@ -188,7 +188,7 @@ def _answer_for_engine(sheet: dict[str, Any], asked: dict[str, Any], loads: list
     setting = Setting(**{name: asked[name] for name in names if asked[name] is not None})
     engine.check(setting)
     load = loads[0] if loads else None
-    body = options.read_body(sheet | {"load": load, "force": asked["force"]}, load, also=options.FOR_ENGINE)
+    body = options.read_body(sheet | {"load": load, "force": asked["force"]}, load, further=options.FOR_ENGINE)
     make = partial(Scene, body.body, body.mesh, body.material, str(body.load), asked["force"], scale=asked["scale"])
     if asked["definition"] is None:
         try:
@@ -218,12 +218,12 @@ def _refuse(why: str) -> "SpringNet":
     "--definition lattice --out hole.xml",
 )
 @options.sheet_options("A mesh type, or a mesh file.", "for masses, and the largest stable time steps", "structured")
-@click.option("--definition", default="patch", show_default=True, help="Rule for the stiffness, see `definitions`.")
+@click.option("--definition", default="patch", show_default=True, help="Definition, see `springtune definitions`.")
 @click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that need one.")
-@click.option("--load", help="What holds and pulls the beam, nothing without; or a shape, its only load without.")
+@click.option("--load", help="Load of the beam, by default none; or load case of the shape, by default its only one.")
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
-@options.target_option("--out", "File, replaced if it is there", required=True)
+@options.target_option("--out", "File to write, replaced if it exists", required=True)
 def springs(sheet: dict[str, Any], load: str | None, target: Path, **how: Any) -> None:
     """Write the springs of a mesh to a file: rest lengths, stiffnesses, masses, and energies besides springs.
 
@@ -295,7 +295,7 @@ def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], **test: 
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
-    """Options of each test of a file: one test of a CSV file, the list in a YAML file."""
+    """Return the options of each test: one test of a CSV file, or several in a YAML file."""
     from yaml import YAMLError, safe_load
 
     from ..safe_io import LARGEST_CSV, read
@@ -317,7 +317,7 @@ def _rows(path: Path) -> list[dict[str, Any]]:
 def _test(
     beam: str | None, study: str | None, thickness: str, load: str, file: Path | None = None, **others: Any
 ) -> "MeasuredTest":
-    """Test of its options."""
+    """Make a test from its options."""
     from ..scene.measured import MeasuredTest
 
     if not ((beam or study) and load and file):

@@ -136,12 +136,12 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
     """Text of a search for a mesh."""
     from ..prediction.search import answer_text, tried_names
 
-    wanted, where = f"{100 * search.error:.6g} %", "under" if subject.of_beam else "in"
+    limit, where = f"{100 * search.error:.6g} %", "under" if subject.of_beam else "in"
     *loads, last = search.loads
     named = f"{', '.join(loads)} and {last}" if loads else last
     parts = {} if springs_alone else {"with any definition": (search.best, search.by_type)}
     parts["with springs alone"] = search.best_springs, search.springs_by_type
-    lines = [f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {named}", ""]
+    lines = [f"{subject.name}; {subject.made_of}; an error of at most {limit} {where} {named}", ""]
     for what, (one, _) in parts.items():
         lines.append(f"{what.replace('with any definition', 'recommended')}: {answer_text(one)}")
     notes: dict[str, None] = {}
@@ -157,7 +157,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         "",
         f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
         f"Tried: {', '.join(name for name in names if any(one.worst(name) < math.inf for one in search.tried))}.",
-        f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
+        f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {limit},",
         "also if they change once more by as much as over the last refinement.",
         "Sizes between whole divisions are tried, too.",
         *subject.meaning("solved on each mesh"),
@@ -184,7 +184,7 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
 
 
 def fit_text(fit: "EngineFit", mesh_name: str, tried: Sequence[str] = ()) -> str:
-    """Text of a calibration, which ends in what to type; with the definitions that were `tried`."""
+    """Text of a calibration with the definitions that were `tried`; its end has the numbers to type."""
     from ..engines.calibration import MOST_SPREAD
 
     about, mesh = fit.scene.boundary_problem, fit.scene.mesh
@@ -208,9 +208,9 @@ def fit_text(fit: "EngineFit", mesh_name: str, tried: Sequence[str] = ()) -> str
 
 
 def _to_type(fit: "EngineFit", too_narrow: bool) -> Iterator[str]:
-    """Lines of what to type with the factor, and without one if it is `too_narrow` or missing."""
+    """Lines with the numbers to type: with the factor, and if it is `too_narrow` or missing, without one."""
     from ..engines.calibration import CONVERGED_ERROR, typed_text
-    from ..engines.run import off_text
+    from ..engines.run import error_words
 
     if found := fit.factor == fit.factor:
         yield f"type at {fit.result.setting}, for {fit.scene.load}: {typed_text(fit.typed_rows())}"
@@ -219,12 +219,12 @@ def _to_type(fit: "EngineFit", too_narrow: bool) -> Iterator[str]:
         yield f"type at {best.setting}, without a factor: {best.typed}"
     elif not found:
         yield f"no setting that was tried has a solver error below {100 * CONVERGED_ERROR:g} %; the nearest one:"
-        yield f"type at {best.setting}, {off_text(best.solver_error)} by its solver: {best.typed}"
+        yield f"type at {best.setting}, {error_words(best.solver_error)} by its solver: {best.typed}"
 
 
 def written_text(net: "SpringNet", written: Iterable[Path]) -> str:
     """Written files and their expected errors, as text."""
-    from ..handover.formats import FOR_MUJOCO, ending_of
+    from ..handover.formats import MUJOCO_ENDINGS, ending_of
     from ..handover.mujoco import for_versions
 
     header, (first, *others) = net.header, written
@@ -234,7 +234,7 @@ def written_text(net: "SpringNet", written: Iterable[Path]) -> str:
     counts = [*extent, f"{len(net.points)} particles", springs, *besides]
     lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
     lines += [f"beside it: {', '.join(map(str, others))}"] if others else []
-    lines += [for_versions(net.energies)] if ending_of(first) in FOR_MUJOCO else []
+    lines += [for_versions(net.energies)] if ending_of(first) in MUJOCO_ENDINGS else []
     errors, what = header["expected_error"], "error of the displacement" if header["beam"] else "errors"
     if isinstance(errors, dict):
         known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]

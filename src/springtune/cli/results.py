@@ -57,7 +57,7 @@ def export(path: Path, target: Path, group: str, force: bool) -> None:
     from ..studies.output import reading
     from ..studies.output.export import export as write
 
-    with reading.open(path) as tree, reading.guarded(path):
+    with reading.open(path) as tree, reading.guard(path):
         click.echo(write(tree, target, group, force))
 
 
@@ -126,7 +126,7 @@ def docs() -> None:
 @click.option(
     "--absolute", type=click.FloatRange(0), help="Tolerance in SI units.  [default: 0; without unit, --relative]"
 )
-@click.option("--group", "groups", multiple=True, help="Group to compare, such as sensitivity; all without.")
+@click.option("--group", "groups", multiple=True, help="Group to compare, such as sensitivity; all by default.")
 @click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
 @click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
 def diff(
@@ -146,7 +146,7 @@ def diff(
 
     try:
         paths = [reading.dataset_file(before), reading.dataset_file(after)]
-        with reading.open(paths[0]) as one, reading.open(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
+        with reading.open(paths[0]) as one, reading.open(paths[1]) as other, reading.guard(f"{paths[0]}, {paths[1]}"):
             found = compare(one, other, Tolerance(relative, absolute), most=rows, **chosen)
             click.echo(comparison_text(found, paths, rows))
     except (OSError, ValueError) as error:
@@ -161,7 +161,7 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int = ROWS
     changed = [(group.name, one) for group in found.groups for one in (*group.flags, *group.values) if one.changed]
     parts = [[f"{f'{side}:':7} {path}" for side, path in zip(COMPARED, paths)]]
     parts[0].append(_summary(found, sum(one.changed for _, one in changed)))
-    parts += [part for group in found.groups for part in _alone(group, most)]
+    parts += [part for group in found.groups for part in _only_in_one(group, most)]
     if changed:
         counts: list[list[object]] = [["  variable", "cells", "changed", "largest change"]]
         for name, one in changed:
@@ -173,24 +173,24 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int = ROWS
             values = _value(row.before), _value(row.after), _difference(row)
             rows.append([f"  {variable_name(row.group, row.variable)}", *values, _place(groups[row.group], row.labels)])
         parts.append(["values that changed", *aligned(counts, 0, (1, 2)).splitlines()])
-        table, more = aligned(rows, 0, (1, 2, 3)), _more(sum(one.changed for _, one in changed) + 1 - len(rows))
+        table, more = aligned(rows, 0, (1, 2, 3)), _omitted(sum(one.changed for _, one in changed) + 1 - len(rows))
         parts.append(["the largest changes, measured by the tolerance", *table.splitlines(), *more])
     if found.attributes:
-        told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
-        parts.append(["attributes that differ; they are no results", *aligned(told, 0).splitlines()])
+        attributes = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
+        parts.append(["attributes that differ; they are no results", *aligned(attributes, 0).splitlines()])
     return paragraphs(parts)
 
 
 def _summary(found: "Comparison", changed: int) -> str:
     """Summary in one line."""
     groups = found.groups
-    said = [f"group {path} only {side}" for side, own in zip(COMPARED, found.alone) for path in own]
+    counts = [f"group {path} only {side}" for side, own in zip(COMPARED, found.only_groups) for path in own]
     for number, side in enumerate(COMPARED):
-        said += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
+        counts += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
     unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in groups)
-    said += [f"{changed} values changed"] if changed else []
-    said += [f"{unlike} variables are only in one, or cannot be compared"] if unlike else []
-    result = f"different: {', '.join(said) or 'labels'};" if found.different else "the same:"
+    counts += [f"{changed} values changed"] if changed else []
+    counts += [f"{unlike} variables are only in one, or cannot be compared"] if unlike else []
+    result = f"different: {', '.join(counts) or 'labels'};" if found.different else "the same:"
     return f"{result} {sum(one.compared for group in groups for one in (*group.flags, *group.values))} values compared"
 
 
@@ -198,27 +198,27 @@ def _cells(group: str) -> str:
     return "scenes" if group == "/" else f"cells of {group}"
 
 
-def _alone(group: "GroupChanges", most: int) -> Iterator[list[str]]:
+def _only_in_one(group: "GroupChanges", most: int) -> Iterator[list[str]]:
     """Paragraphs on labels, cells and variables of a group that only one dataset has."""
     labels = []
     for name, both in group.labels.items():
         for side, own in zip(COMPARED, both):
-            said = ", ".join(_place(group, {name: label}) for label in own[:most])
+            names = ", ".join(_place(group, {name: label}) for label in own[:most])
             more = f", and {len(own) - most} more" if len(own) > most else ""
-            labels += [f"  {name} only {side}: {said}{more}"] if own else []
+            labels += [f"  {name} only {side}: {names}{more}"] if own else []
     if labels:
         yield [f"labels of {group.name}", *labels]
-    for side, alone in zip(COMPARED, group.cells):
-        if alone.count:
-            lines = [f"  {_place(group, one)}" for one in alone.rows]
-            yield [f"{_cells(group.name)} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
+    for side, cells in zip(COMPARED, group.cells):
+        if cells.count:
+            lines = [f"  {_place(group, one)}" for one in cells.rows]
+            yield [f"{_cells(group.name)} only {side}: {cells.count}", *lines, *_omitted(cells.count - len(lines))]
     variables = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
     if variables or group.unlike:
         yield [f"variables of {group.name}", *variables, *(f"  {name} {why}" for name, why in group.unlike.items())]
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
-    """Labels of dimensions with several labels, for readers."""
+    """Return the labels of a cell as text, without dimensions of one label."""
     return cell_text({name: label for name, label in labels.items() if group.sizes[name] > 1}, group.units)
 
 
@@ -226,8 +226,8 @@ def _short(text: str) -> str:
     return clipped(" ".join(text.split()) or "none")
 
 
-def _more(count: int) -> list[str]:
-    """Line on rows that are left out, if any."""
+def _omitted(count: int) -> list[str]:
+    """Return a line on rows that are left out, or an empty list."""
     return [f"  and {count} more; --rows shows them"] if count > 0 else []
 
 
@@ -241,7 +241,7 @@ def _difference(row: "Change") -> str:
     """Difference with unit, and as a share of the former number."""
     number = row.difference
     if not math.isfinite(number):
-        return "gone" if row.after == "" or row.after != row.after else "new" if row.before != row.before else ""
+        return "removed" if row.after == "" or row.after != row.after else "new" if row.before != row.before else ""
     units = "" if row.units in ("", "1") else f" {row.units}"
     before = float(row.before)
     share = f" ({100 * number / abs(before):+.2g} %)" if before and units else ""

@@ -46,7 +46,7 @@ def new(study: str, shape: bool, source: str | None) -> None:
     if not path.parent.is_dir():
         raise click.ClickException(f"{path.parent}: there is no such folder; make it, or name another")
     if shape and source:
-        raise WrongCall(f"--shape means nothing beside --from {source}; leave one of the two out")
+        raise WrongCall(f"--shape cannot be combined with --from {source}; leave one of the two out")
     with file_errors(f"{path}: cannot be written", "name another place"):
         if source:
             _copy(source, path)
@@ -109,7 +109,7 @@ def schema_line(path: Path) -> str:
 
 @command("springtune scenes config/mine.yaml", "SPRINGTUNE_MAX_SCENES=2e6 springtune scenes large.yaml")
 @click.argument("config", type=PATH)
-@click.option("--results", type=PATH, default=".", help="Folder in which results/ is.")
+@click.option("--results", type=PATH, default=".", help="Folder of results/.")
 def scenes(config: Path, results: Path) -> None:
     """List a study's scenes, what they share and what is stored, without running it.
 
@@ -166,7 +166,7 @@ def definitions() -> None:
     options_metavar="[--results FOLDER]",
 )
 @click.option(
-    "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
+    "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder of results/, made if missing."
 )
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
 def run(results: Path | None, arguments: tuple[str, ...]) -> None:
@@ -218,9 +218,9 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
         for record in found or {}:
             record.unlink()
         if found == {} and _asks_for_all(options):
-            from ..studies.output.summary import reminder
+            from ..studies.output.summary import idle_report
 
-            click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
+            click.echo(f"Nothing to be done: {_results(study)} is complete.\n{idle_report(_results(study))}", nl=False)
             return
     # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
     # begins with - is not an option behind =.
@@ -298,10 +298,10 @@ def _outdated(studies: list[Any], remedy: str) -> dict[Path, str] | None:
     """Records of outdated jobs, with the reasons; None if a job was never done. Missing files are printed."""
     from ..studies.runs import plan
 
-    each = [plan.outdated(study, _results(study)) for study in studies]
+    each = [plan.outdated_records(study, _results(study)) for study in studies]
     found = {record: why for one in each for record, why in (one or {}).items()}
     for why in found.values():
-        if why.endswith(plan.MISSING):
+        if why.endswith(plan.MISSING_ENDING):
             click.echo(f"{why}; {remedy}", err=True)
     return found if found or None not in each else None
 

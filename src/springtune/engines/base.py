@@ -20,7 +20,7 @@ from ..handover.simulation import ENERGY_WORDS, VALUES, Net
 from ..linalg.kernels import compiled
 from ..mechanics import PRECISIONS
 from ..mechanics.energies import Energy
-from ..problem.quantities import positive, put, whole
+from ..problem.quantities import positive, put, whole_number
 from ..registry import Declaration, Registry, how_to_install
 from ..safe_io import number_text
 
@@ -28,7 +28,7 @@ MOST_STEPS, LONGEST_FRAME = 100_000, 1.0  # most substeps and iterations, and th
 
 
 def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
-    """Return a finite number that is not below the least one."""
+    """Return a number; refuse one that is not finite or is below `least`."""
     if isinstance(value, bool) or not isinstance(value, Real) or not least <= float(value) < np.inf:
         what = "of zero or more" if least == 0 else "above zero"
         raise ValueError(f"{name}: {value!r} is not a finite number {what}; give one")
@@ -36,7 +36,7 @@ def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
 
 
 class EngineError(ValueError):
-    """Engine that cannot run a scene; the message says why and what to do.
+    """An engine cannot run a scene; the message says why and what to do.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class EngineError(ValueError):
 
 
 class EngineAbsentError(EngineError):
-    """An engine whose program is not installed; the message says how it is installed."""
+    """The program of an engine is not installed; the message says how to install it."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Setting:
         if isinstance(dt, str) and "/" in dt and dt.replace("/", "", 1).replace(" ", "").isdigit():
             above, below = map(int, dt.split("/"))
             dt = above / below if below else 0.0
-        counts = {name: whole(getattr(self, name), name, MOST_STEPS) for name in ("substeps", "iterations")}
+        counts = {name: whole_number(getattr(self, name), name, MOST_STEPS) for name in ("substeps", "iterations")}
         put(self, dt=positive(dt, "time", "dt"), **counts)
         if self.dt > LONGEST_FRAME:
             why = f"{self.dt:g} s is longer than {LONGEST_FRAME:g} s"
@@ -132,7 +132,7 @@ SPRING_STIFFNESS = Parameter("N/m", "k of the definition, one for each spring") 
 
 
 def typed_springs(net: SpringNet) -> dict[str, Any]:
-    """Stiffness of each spring [N/m] and moduli of energies, as they are."""
+    """Return the net's own stiffness of each spring [N/m] and moduli of energies."""
     values = {f"{one.kind} {name}": value for one in net.energies for name, value in one.values.items()}
     return ({"stiffness": net.stiffness} if np.any(net.stiffness) else {}) | values
 
@@ -203,12 +203,12 @@ class Engine(Declaration):
 
     @property
     def absent(self) -> str:
-        """Why it cannot run here, and how to install it; empty where it can."""
+        """Return why the engine cannot run here and how to install it, or an empty string."""
         lacking = [need for need in self.needs if not _is_installed(need)]
         return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}" if lacking else ""
 
     def check(self, setting: Setting, net: SpringNet | None = None) -> None:
-        """Refuse what the engine cannot run.
+        """Refuse a net or a setting that the engine cannot run.
 
         Parameters
         ----------
@@ -354,7 +354,7 @@ def stretch_spring(x, weights, i, j, dx, dy, change):  # type: ignore[no-untyped
 
 @compiled
 def project_springs(x, weights, springs, lengths, shares, compliance, multipliers, iterations):  # type: ignore[no-untyped-def]
-    """Project all springs some times, by a share of what each asks for; compliance is over the squared step."""
+    """Project all springs several times, each by a share of its correction; compliance is over the squared step."""
     for _ in range(iterations):
         for e in range(len(lengths)):
             i, j = springs[e]
@@ -412,7 +412,7 @@ def refuse_pushing_springs(net: SpringNet, why: str) -> None:
 
 
 def energy_parameters(*kinds: str) -> dict[str, Parameter]:
-    """Parameters of a solver that takes stiffnesses and values of kinds of energies as a net has them."""
+    """Parameters of a solver that takes a net's stiffnesses, and values of some kinds of energies, unchanged."""
     return {"stiffness": SPRING_STIFFNESS} | {
         f"{kind} {name}": Parameter(unit, f"{name} of {ENERGY_WORDS[kind]}, as of the net")
         for kind in kinds

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..handover.net import NOT_COMPUTED, SpringNet
 from ..mesh.cells import Mesh
-from ..prediction.choices import check_loads, check_names, places, predicted, trial
+from ..prediction.choices import check_loads, check_names, edge_places, predictable_loads, trial
 from ..problem.compare import error_text
 from ..problem.loads import LOADS
 from ..problem.shapes import Shape
@@ -23,7 +23,7 @@ from ..safe_io import Tabled, TabledList, number_text
 from ..scene.boundary_problem import ShapeProblem, unit_reference
 from ..scene.single import Scene
 from .base import ENGINES, Engine, EngineError, Setting
-from .run import MOST_DRIFT, EngineResult, drift, frame_text, in_engine, net_of, off_text, with_precision
+from .run import MOST_DRIFT, EngineResult, drift, error_words, frame_text, in_engine, net_of, with_precision
 
 logger = logging.getLogger(__name__)
 
@@ -140,7 +140,7 @@ class NeededSetting(Tabled):
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "more", self.raised
         yield "setting", str(self.setting) if self.found else f"not reached with {self.setting}"
-        yield "solver error", off_text(self.solver_error)
+        yield "solver error", error_words(self.solver_error)
         yield "a frame", frame_text(self.frame_seconds)
 
 
@@ -238,7 +238,7 @@ class EngineFit(Tabled):
             yield f"type {name}", f"{_with_unit(value, unit)}: {formula}"
         yield "displacement", number_text(self.result.displacement, "m")
         yield "by finite elements", number_text(self.result.reference, "m")
-        yield "error", off_text(self.error, self.result.reference)
+        yield "error", error_words(self.error, self.result.reference)
         if ENGINES[self.result.engine].iterates:
             yield "in other orders", _between(self.spread, self.result.reference)
         yield "drift across", self.result._drift_text
@@ -268,24 +268,24 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         return in_engine(scene, self.engine, setting, factor=factor, **about)
 
     def orders(self, factor: float, setting: Setting) -> list[EngineResult]:
-        """Runs in all orders of particles, springs and cells, of which engines without iterations have one."""
+        """Runs with the particles, springs and cells in several orders; one run if the engine does not iterate."""
         others = range(1, TRIED_ORDERS if ENGINES[self.engine].iterates else 1)
         return [self[factor, setting], *(self.under(self.scene, factor, setting, order) for order in others)]
 
     def spread(self, factor: float, setting: Setting) -> tuple[tuple[float, float], str]:
-        """Least and largest error over these orders, and why no factor is right where they are too far apart."""
+        """Return the least and largest error over these orders, and the reason if they differ too much for a factor."""
         runs = self.orders(factor, setting)
         errors = np.array([one.error for one in runs])
         low, high = float(errors.min()), float(errors.max())
         if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= MOST_SPREAD:
             return (low, high), ""
-        said = f"is {_between((low, high), runs[0].reference)} in" if low == low else "diverges in some of"
+        outcome = f"is {_between((low, high), runs[0].reference)} in" if low == low else "diverges in some of"
         tried = f"{TRIED_ORDERS} orders of the same particles, with {factor:.4g} times the numbers of the definition"
         why = "the solver has not converged, so no factor holds in other scripts; take more substeps or iterations"
-        return (low, high), f"the error at {setting} {said} {tried}: {why}"
+        return (low, high), f"the error at {setting} {outcome} {tried}: {why}"
 
     def ratio(self, factor: float, setting: Setting) -> float:
-        """Displacement over the reference's; NaN where it diverged."""
+        """Return the displacement over the reference's; NaN if the run diverged."""
         found = self[factor, setting]
         return found.displacement / found.reference
 
@@ -354,7 +354,7 @@ def fit_engine(
     runs = _Runs(scene, engine, frames)
     untuned = runs[1.0, setting]
     if not abs(untuned.reference) > 0:
-        raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
+        raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; add one to its quantities")
     spread, why = runs.spread(1.0, setting)
     factor, why = (np.nan, why) if why else _factor(runs, setting)
     tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=lambda one: _size(one.error))
@@ -372,13 +372,13 @@ def fit_engine(
 
 
 def _typed_rows(engine: Engine, typed: Mapping[str, Any], mesh: Mesh) -> Iterator[tuple[str, str, str, str]]:
-    """Name, value or range by the place of springs, unit and formula of each number to type, as texts."""
+    """Name, value or range by place of springs, unit and formula of each number to type, as texts."""
     for name, known in engine.parameters.items():
         if name in typed:
             values = np.asarray(typed[name])
             each = {"": _range_text(values)}
             if values.shape == (len(mesh.edges),):
-                each = {f"{where} ": _range_text(values[part]) for where, part in places(mesh).items()}
+                each = {f"{where} ": _range_text(values[part]) for where, part in edge_places(mesh).items()}
             text = ", ".join(f"{where}{value}" for where, value in each.items() if value)
             yield name, text, known.unit, known.formula
 
@@ -395,13 +395,13 @@ def _with_unit(value: str, unit: str) -> str:
 
 
 def typed_text(rows: Iterable[tuple[str, str, str, str]]) -> str:
-    """Names, values and units of what to type, in one line."""
+    """Names, values and units of the numbers to type, in one line."""
     return "; ".join(f"{name} {_with_unit(value, unit)}" for name, value, unit, _ in rows)
 
 
 def _between(errors: tuple[float, float], reference: float) -> str:
-    """Least and largest error in words."""
-    low, high = (off_text(error, reference) for error in sorted(errors, key=abs))
+    """Range of errors in words, from the least to the largest."""
+    low, high = (error_words(error, reference) for error in sorted(errors, key=abs))
     if low == high:
         return low
     words = high.partition(" ")[2]
@@ -409,12 +409,12 @@ def _between(errors: tuple[float, float], reference: float) -> str:
 
 
 def _is_at_rest(one: EngineResult) -> bool:
-    """Whether a run rests, or does but for its rounding."""
+    """Whether a run is at rest, up to rounding."""
     return one.status == "rest" or one.status != "inverted" and one.swing <= MOST_SWING * abs(one.displacement)
 
 
 def _size(error: float) -> float:
-    """Absolute value; infinite where it diverged."""
+    """Size of an error; infinite if the run diverged."""
     return abs(error) if np.isfinite(error) else np.inf
 
 
@@ -424,7 +424,7 @@ def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
         known = scene.shape.loads
         others = check_names("loads", known if loads is None else loads, known, tuple(known), "is unknown")
     else:
-        others = check_loads(predicted() if loads is None else loads)
+        others = check_loads(predictable_loads() if loads is None else loads)
     return tuple(dict.fromkeys((scene.load, *others)))
 
 

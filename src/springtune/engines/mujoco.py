@@ -18,7 +18,7 @@ from .base import SPRING_STIFFNESS, EngineError, Parameter, Session, Setting, en
 
 FLEX_SINCE = 4  # version of MuJoCo from which on a flex has the law of plane stress
 
-TYPED = {
+PARAMETERS = {
     "stiffness": SPRING_STIFFNESS,
     "young": Parameter("Pa", "E"),
     "poisson": Parameter("1", "nu"),
@@ -93,7 +93,7 @@ def _declare(order: float, integrator: str, summary: str, **declared: Any) -> No
         program="MuJoCo",
         extra="mujoco",
         precisions=("float64",),
-        parameters=TYPED,
+        parameters=PARAMETERS,
         typed=typed,
         source="MuJoCo's documentation, Computation",
         besides="flag autoreset=disable: by default what explodes is put back, and the sheet stands at 0; gravity 0",

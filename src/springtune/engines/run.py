@@ -14,7 +14,7 @@ from ..handover.net import SpringNet
 from ..handover.simulation import EquilibriumWarning, simulate
 from ..problem.boundary import displacement_weights
 from ..problem.compare import error_text
-from ..problem.quantities import whole
+from ..problem.quantities import whole_number
 from ..safe_io import Tabled, number_text
 from ..scene.single import Result, Scene
 from .base import ENGINES, Engine, EngineError, Session, Setting, number
@@ -50,10 +50,10 @@ MOST_CHANGE_RATIO = 0.99
 """Largest ratio of changes from one window to the next: slower creep counts as rest, since it may be rounding."""
 
 
-def off_text(error: float, reference: float = 0.0) -> str:
-    """Error of a displacement in words: "diverged" without one, and times instead of percents where it is large.
+def error_words(error: float, reference: float = 0.0) -> str:
+    """Error of a displacement as text: "diverged" for NaN, and a factor instead of percents if it is large.
 
-    >>> off_text(0.02, 1e-3), off_text(-10.0, -1e-3), off_text(float("nan"), 1e-3)
+    >>> error_words(0.02, 1e-3), error_words(-10.0, -1e-3), error_words(float("nan"), 1e-3)
     ('+2.00 %', '11 times too far', 'diverged')
     """
     times = 1 + error * np.sign(reference or error)
@@ -169,7 +169,7 @@ class EngineResult(Tabled, Ended):
 
     @cached_property
     def drift(self) -> float:
-        """Error across what is measured: displacement in the other direction, over abs(reference) [1]."""
+        """Error across the measured direction: of the displacement along the other axis, over abs(reference) [1]."""
         return drift(self.scene, self.displacements)
 
     @property
@@ -180,7 +180,7 @@ class EngineResult(Tabled, Ended):
 
     @property
     def drifts(self) -> str:
-        """A sentence on `drift`."""
+        """Sentence for a warning about `drift`."""
         return f"moves across by {self._drift_text} of what finite elements move along, which 'error' does not say"
 
     @property
@@ -196,19 +196,19 @@ class EngineResult(Tabled, Ended):
         yield "a frame", frame_text(self.frame_seconds)
 
     def _computed_rows(self) -> Iterator[tuple[str, str]]:
-        yield "error", off_text(self.error, self.reference)
+        yield "error", error_words(self.error, self.reference)
         yield "from the definition", error_text(self.definition_error)
         if self.by_law != self.exact:
             yield "from the law", error_text(self.law_error)
-        yield "from the solver", off_text(self.solver_error, self.reference)
+        yield "from the solver", error_words(self.solver_error, self.reference)
         yield "drift across", self._drift_text
 
     @property
     def _parts(self) -> str:
         """Error in words, with its parts."""
         parts = {"definition": self.definition_error, "law": self.law_error, "solver": self.solver_error}
-        each = (f"{name} {off_text(part, self.reference)}" for name, part in parts.items() if part)
-        return f"{off_text(self.error, self.reference)} ({', '.join(each)})" if self.error == self.error else "diverged"
+        each = ", ".join(f"{name} {error_words(part, self.reference)}" for name, part in parts.items() if part)
+        return f"{error_words(self.error, self.reference)} ({each})" if self.error == self.error else "diverged"
 
 
 def in_engine(
@@ -279,7 +279,7 @@ def in_engine(
     session = chosen.start(net, setting, damping)
     window = max(1, round(WINDOW_PERIODS * 2 * np.pi / frequency / setting.dt))
     usual = max(MOST_FRAMES, ceil(LEAST_PERIODS / WINDOW_PERIODS) * window)
-    asked = usual if frames is None else whole(frames, "frames", MOST_ITERATIONS)
+    asked = usual if frames is None else whole_number(frames, "frames", MOST_ITERATIONS)
     if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_ITERATIONS:
         why = f"{asked} frames of {setting} are over {MOST_ITERATIONS:.0e} iterations"
         raise EngineError(f"dt: {why}; take a longer dt, or fewer substeps")
@@ -298,7 +298,7 @@ def with_precision(engine: Engine, setting: Setting) -> Setting:
 
 
 def drift(scene: Scene, displacements: np.ndarray) -> float:
-    """Error of what is measured in the other direction, over what finite elements move along [1]; or NaN."""
+    """Error of the displacement along the other axis, over the reference's along the load [1]; NaN without one."""
     if not (one := scene.boundary_problem.watched):
         return np.nan
     exact, grouped = scene.reference().at(scene.mesh.points), scene.boundary_problem.grouped
@@ -329,7 +329,7 @@ def reordered(net: SpringNet, order: int) -> tuple[SpringNet, np.ndarray]:
 
 
 def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
-    """Net of a scene with all stiffnesses and moduli times a factor; refuse what no engine runs."""
+    """Net of a scene with all stiffnesses and moduli times a factor; refuse scenes that no engine runs."""
     if scene.kinematics == "linear":
         raise EngineError("kinematics: 'linear', and engines keep the length law of springs; take 'nonlinear'")
     scene.motion()  # refuses what has no masses, and loads that turn or prescribe displacements

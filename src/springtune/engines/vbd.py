@@ -59,7 +59,7 @@ def _squares(x, cell, corner, squares, tensile, coupling, block):  # type: ignor
 
 @compiled
 def _area(x, cell, corner, double, modulus, block):  # type: ignore[no-untyped-def]
-    """Add force and second derivatives of a cell's area; `double` is twice it at rest, `modulus` over twice that."""
+    """Add force and second derivatives of a cell's area; `double` is 2 rest areas, `modulus` is over 4 rest areas."""
     corners, twice = len(cell), -double
     for c in range(corners):
         i, j = cell[c], cell[(c + 1) % corners]
@@ -77,7 +77,7 @@ def _area(x, cell, corner, double, modulus, block):  # type: ignore[no-untyped-d
 
 @compiled
 def _sweeps(x, y, inertia, weights, springs, squares, triangles, quads, iterations):  # type: ignore[no-untyped-def]
-    """Visit all particles in order, some times; of each group: pointers, places, cells, and two or three values."""
+    """Visit all particles in order, several times; a group has pointers, places, cells, and two or three values."""
     block = np.empty(5, x.dtype)
     for _ in range(iterations):
         for i in range(len(x)):

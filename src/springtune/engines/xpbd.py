@@ -17,7 +17,7 @@ from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
 from ..linalg.kernels import compiled
 from .base import EngineError, Parameter, Setting, Textbook, engine, project_springs
 
-BLOCK_KINDS = tuple(COMPLIANCE_UNITS)  # kinds of blocks, by their numbers here
+BLOCK_KINDS = tuple(COMPLIANCE_UNITS)  # kinds of blocks; compiled loops take a kind's index
 
 LEAST_AREA_RATIO = 0.05
 """Least area over that at rest; smaller or inverted triangles of rubber count as having it."""
@@ -28,48 +28,48 @@ def _volume(trace, area, shear, bulk):  # type: ignore[no-untyped-def]
     """Logarithm of the volume of compressible rubber, by Newton's method."""
     v = 0.0
     for _ in range(8):
-        pull, press, grown = trace * np.exp(-2 * v / 3), np.exp(4 * v / 3) / area**2, np.exp(v)
-        slope = shear / 3 * (2 * press - pull) + bulk * grown * (grown - 1)
-        bend = shear / 9 * (2 * pull + 8 * press) + bulk * grown * (2 * grown - 1)
-        v = max(v - slope / bend, -0.6)
+        pull, press, volume = trace * np.exp(-2 * v / 3), np.exp(4 * v / 3) / area**2, np.exp(v)
+        slope = shear / 3 * (2 * press - pull) + bulk * volume * (volume - 1)
+        curvature = shear / 9 * (2 * pull + 8 * press) + bulk * volume * (2 * volume - 1)
+        v = max(v - slope / curvature, -0.6)
     return v
 
 
 @compiled
-def _rubber(here, slopes, rest, area, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
-    """Constraints of a triangle of rubber and their derivatives; `growth` is its area's derivative by its corners."""
+def _rubber(positions, slopes, rest, area, growth, law, compressible, values, gradients):  # type: ignore[no-untyped-def]
+    """Set the three constraints of a triangle of rubber and their gradients; `growth` is the gradient of its area."""
     across, turned, share = 0.0, 0.0, 1.0
     for c in range(3):
-        across += here[c, 0] * slopes[c, 0] - here[c, 1] * slopes[c, 1]
-        turned += here[c, 0] * slopes[c, 1] + here[c, 1] * slopes[c, 0]
+        across += positions[c, 0] * slopes[c, 0] - positions[c, 1] * slopes[c, 1]
+        turned += positions[c, 0] * slopes[c, 1] + positions[c, 1] * slopes[c, 0]
     if compressible:
         share = np.exp(-_volume(across**2 + turned**2 + 2 * area, area, law[0], law[1]) / 3)
     r = area * share**2
     root = np.sqrt(2 * r + 1)
-    value[0], value[1], value[2] = share * across, share * turned, (r - 1) * root / r
+    values[0], values[1], values[2] = share * across, share * turned, (r - 1) * root / r
     rise = (root / r**2 + (r - 1) / (r * root)) * share**2
     for c in range(3):
-        by[0, c, 0], by[0, c, 1] = share * slopes[c, 0], -share * slopes[c, 1]
-        by[1, c, 0], by[1, c, 1] = share * slopes[c, 1], share * slopes[c, 0]
-        by[2, c, 0], by[2, c, 1] = rise * (growth[c, 0] / rest), rise * (growth[c, 1] / rest)
+        gradients[0, c, 0], gradients[0, c, 1] = share * slopes[c, 0], -share * slopes[c, 1]
+        gradients[1, c, 0], gradients[1, c, 1] = share * slopes[c, 1], share * slopes[c, 0]
+        gradients[2, c, 0], gradients[2, c, 1] = rise * (growth[c, 0] / rest), rise * (growth[c, 1] / rest)
     if not compressible:
-        excess = value[0] ** 2 + value[1] ** 2 + value[2] ** 2
+        excess = values[0] ** 2 + values[1] ** 2 + values[2] ** 2
         scale = np.sqrt(1 + law[0] * excess + law[1] * excess**2)
         more = (law[0] + 2 * law[1] * excess) / scale
         for c in range(3):
             for d in range(2):
-                whole = value[0] * by[0, c, d] + value[1] * by[1, c, d] + value[2] * by[2, c, d]
+                whole = values[0] * gradients[0, c, d] + values[1] * gradients[1, c, d] + values[2] * gradients[2, c, d]
                 for a in range(3):
-                    by[a, c, d] = scale * by[a, c, d] + more * value[a] * whole
-        value[0], value[1], value[2] = value[0] * scale, value[1] * scale, value[2] * scale
+                    gradients[a, c, d] = scale * gradients[a, c, d] + more * values[a] * whole
+        values[0], values[1], values[2] = values[0] * scale, values[1] * scale, values[2] * scale
 
 
 @compiled
 def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multipliers):  # type: ignore[no-untyped-def]
     """Project all blocks of a kind once; number by number, since operations on rows take seconds to compile."""
     size, corners = multipliers.shape[1], cells.shape[1]
-    here, growth, value = np.empty((corners, 2), x.dtype), np.empty((corners, 2), x.dtype), np.empty(size, x.dtype)
-    by, matrix = np.zeros((size, corners, 2), x.dtype), np.empty((size, size), x.dtype)
+    here, growth, values = np.empty((corners, 2), x.dtype), np.empty((corners, 2), x.dtype), np.empty(size, x.dtype)
+    gradients, matrix = np.zeros((size, corners, 2), x.dtype), np.empty((size, size), x.dtype)
     for e in range(len(cells)):
         cell, area = cells[e], 0.0
         for c in range(corners):
@@ -78,39 +78,40 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
             growth[c, 0], growth[c, 1] = 0.5 * (x[after, 1] - x[before, 1]), 0.5 * (x[before, 0] - x[after, 0])
             area += 0.5 * (here[c, 0] * growth[c, 0] + here[c, 1] * growth[c, 1])
         if kind == 0:
-            value[0] = area - rest[e, 0]
+            values[0] = area - rest[e, 0]
             for c in range(corners):
-                by[0, c, 0], by[0, c, 1] = growth[c, 0], growth[c, 1]
+                gradients[0, c, 0], gradients[0, c, 1] = growth[c, 0], growth[c, 1]
         elif kind == 1:
             for c in range(3):
                 after, before = (c + 1) % 3, c - 1
                 dx, dy = here[before, 0] - here[after, 0], here[before, 1] - here[after, 1]
-                value[c] = dx * dx + dy * dy - rest[e, c]
-                by[c, before, 0], by[c, before, 1], by[c, after, 0], by[c, after, 1] = 2 * dx, 2 * dy, -2 * dx, -2 * dy
+                values[c] = dx * dx + dy * dy - rest[e, c]
+                gradients[c, before, 0], gradients[c, before, 1] = 2 * dx, 2 * dy
+                gradients[c, after, 0], gradients[c, after, 1] = -2 * dx, -2 * dy
         else:
             ratio = max(area / rest[e, 0], LEAST_AREA_RATIO)
-            _rubber(here, slopes[e], rest[e, 0], ratio, growth, law[e], kind == 3, value, by)
+            _rubber(here, slopes[e], rest[e, 0], ratio, growth, law[e], kind == 3, values, gradients)
         for a in range(size):
             for b in range(size):
-                value[a] += compliance[e, a, b] * multipliers[e, b]
+                values[a] += compliance[e, a, b] * multipliers[e, b]
                 matrix[a, b] = compliance[e, a, b]
                 for c in range(corners):
                     for d in range(2):
-                        matrix[a, b] += weights[cell[c], d] * by[a, c, d] * by[b, c, d]
+                        matrix[a, b] += weights[cell[c], d] * gradients[a, c, d] * gradients[b, c, d]
         for a in range(size):  # elimination: the matrix is positive
             for b in range(a + 1, size):
                 factor = matrix[b, a] / matrix[a, a]
                 for c in range(a, size):
                     matrix[b, c] -= factor * matrix[a, c]
-                value[b] -= factor * value[a]
+                values[b] -= factor * values[a]
         for a in range(size - 1, -1, -1):
             for b in range(a + 1, size):
-                value[a] -= matrix[a, b] * value[b]
-            value[a] /= matrix[a, a]
-            multipliers[e, a] -= value[a]
+                values[a] -= matrix[a, b] * values[b]
+            values[a] /= matrix[a, a]
+            multipliers[e, a] -= values[a]
             for c in range(corners):
                 for d in range(2):
-                    x[cell[c], d] -= weights[cell[c], d] * by[a, c, d] * value[a]
+                    x[cell[c], d] -= weights[cell[c], d] * gradients[a, c, d] * values[a]
 
 
 @engine(
@@ -143,7 +144,7 @@ class ExtendedPositionBased(Textbook):
         self.compliance = (1 / (self.stiffness * self.h**2)).astype(self.dtype)
 
     def _group(self, one: Blocks) -> tuple[Any, ...]:
-        """Arrays of a kind of blocks, as `_project_cells` takes them."""
+        """Return the kind, cells and arrays of blocks in the order of `_project_cells`' arguments."""
         values = one.values
         rest = values["rest_length"] ** 2 if "rest_length" in values else values["rest_area"][:, None]
         law = values.get("stiffening", np.zeros((0, 2)))
@@ -153,7 +154,7 @@ class ExtendedPositionBased(Textbook):
         return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.dtype, "C") for part in parts)
 
     def solve(self, y: np.ndarray) -> np.ndarray:
-        """Project the inertial positions."""
+        """Return the positions after all iterations, from the inertial ones."""
         whole, pulls = np.ones_like(self.lengths), np.zeros_like(self.lengths)
         groups = [(*one, np.zeros(one[-1].shape[:2], self.dtype)) for one in self.groups]
         rounds, each = (self.iterations, 1) if groups else (1, self.iterations)

@@ -246,10 +246,10 @@ def write_vtu_with(
 NET_FORMATS = {".csv": _write_csv, ".json": _write_json, ".vtu": write_vtu_with}
 """Functions that write a net, by the ending of the name of its file."""
 
-FOR_MUJOCO = (".xml", ".mjcf")  # endings of files for MuJoCo
+MUJOCO_ENDINGS = (".xml", ".mjcf")  # endings of files for MuJoCo
 
 SIMULATORS: dict[str, tuple[str, Callable[[Net], str]]] = {
-    **dict.fromkeys(FOR_MUJOCO, ("MuJoCo", mjcf)),
+    **dict.fromkeys(MUJOCO_ENDINGS, ("MuJoCo", mjcf)),
     ".py": ("SOFA", sofa_python),
     ".xpbd.json": ("XPBD", xpbd),
     ".newton.py": ("Newton", newton_script),
@@ -261,14 +261,14 @@ SETTING_ENDINGS = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
 
 
 def check_target(path: str | Path) -> str:
-    """Return the ending of a name to write to, which is refused if it is no format or its folder is not there."""
+    """Return the ending of a file to write; refuse an unknown format or a missing folder."""
     ending = ending_of(path)
     check_folder(path)
     return ending
 
 
 def ending_of(path: str | Path) -> str:
-    """Ending of a name that is a format of springs; others are refused."""
+    """Return the ending of a file of springs; refuse an unknown format."""
     path = Path(path)
     known = {**NET_FORMATS, **SIMULATORS}
     # The longest ending that fits: .xpbd.json is not .json.

@@ -31,7 +31,7 @@ def mjcf(net: Net) -> str:
 
 
 def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
-    """Model of a net that moves as a simulation says, by one of MuJoCo's integrators."""
+    """Model of a net with the damping and step of a simulation, by one of MuJoCo's integrators."""
     least = float(simulation.masses[~net.held.all(axis=1)].min())
     if least < LEAST_MASS:
         why = f"the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more"
@@ -84,7 +84,7 @@ def elasticity(first: float, second: float) -> tuple[float, float]:
 
 
 def flex(net: Net) -> dict[str, Any] | None:
-    """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
+    """Values of a flex in place of coupled triangles, which must share one pair of Lame constants; None without any."""
     if not net.energies:
         return None
     first, second = lame(net, net.energies[0], "MuJoCo's flex")

@@ -24,7 +24,7 @@ from ..problem.shapes import Beam
 from ..registry import hook
 from ..safe_io import Tabled
 from ..scene.boundary_problem import BeamProblem, ShapeProblem, check_filled
-from ..scene.mesh_cache import AnyDefinition, MeshCache, definition_of, given_stiffness, is_a, naming_errors
+from ..scene.mesh_cache import AnyDefinition, MeshCache, check_type, definition_of, given_stiffness, naming_errors
 from ..scene.motion import stable_steps
 from ..scene.single import Scene
 from ..springs.base import Definition, DefinitionError, Springs
@@ -64,7 +64,7 @@ STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lag
 
 NOT_COMPUTED = "not computed"  # first words of a text in the place of a number
 
-TOO_MANY = f"{NOT_COMPUTED}: {{}} particles, and at most {{}} are solved for a header"
+SIZE_REASON = f"{NOT_COMPUTED}: {{}} particles, and at most {{}} are solved for a header"
 """Text in the place of expected errors on a large mesh."""
 
 
@@ -208,10 +208,10 @@ class SpringNet(Tabled, Net):
         ValueError
             If the mesh does not fill the beam, or loads are given without a beam.
         """
-        is_a(mesh, Mesh, "mesh")
-        is_a(material, Material, "material")
+        check_type(mesh, Mesh, "mesh")
+        check_type(material, Material, "material")
         if beam is not None:
-            is_a(beam, Beam, "beam")
+            check_type(beam, Beam, "beam")
             check_filled(mesh, beam)
         elif loads is not None:
             raise ValueError(f"loads: {loads!r} have expected errors on the mesh of a beam alone; give beam, too")
@@ -233,7 +233,7 @@ class SpringNet(Tabled, Net):
         return cls(**parts)
 
     def write(self, path: str | Path) -> list[Path]:
-        """Write the net in the format that the ending of a name says; files appear whole or not at all.
+        """Write the net; the ending of the name sets the format, and files appear whole or not at all.
 
         Parameters
         ----------
@@ -260,7 +260,7 @@ class SpringNet(Tabled, Net):
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
-        """Read a net; it has the very numbers that were written.
+        """Read a net, with exactly the numbers that were written.
 
         Parameters
         ----------
@@ -323,7 +323,7 @@ def _parts(
             "quads": len(mesh.quads),
         },
         "load": None,
-        "expected_error": f"{NOT_COMPUTED}: not asked for",
+        "expected_error": f"{NOT_COMPUTED}: not requested",
         "expected_error_means": meaning(),
         "largest_stable_step": f"{NOT_COMPUTED}: {steps}"
         if isinstance(steps, str)
@@ -349,7 +349,7 @@ def _parts(
 
 
 def described(definition: Definition) -> tuple[str, str]:
-    """Formula of a definition in words, and where it comes from."""
+    """Return the formula of a definition in words, and its source."""
     function = inspect.unwrap(definition.function)
     own = inspect.getdoc(function) or ""
     module = sys.modules.get(function.__module__)
@@ -373,7 +373,7 @@ def _expected_errors(
 
     names = (*check_loads(USUAL_LOADS if loads is None else loads), *further)
     if (count := len(cache.mesh.points)) > SEARCHED_PARTICLES:
-        return dict.fromkeys(names, TOO_MANY.format(count, SEARCHED_PARTICLES))
+        return dict.fromkeys(names, SIZE_REASON.format(count, SEARCHED_PARTICLES))
     why = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
     errors: dict[str, float | str] = dict.fromkeys(names, why)
     for name in errors:
@@ -385,7 +385,7 @@ def _expected_errors(
 
 
 def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:
-    """Errors, and for what has none why: it has no reference, or the network fails."""
+    """Return errors by name, and instead of a missing one the reason: no reference, or a failed network."""
     found: dict[str, float | str] = {}
     for name, error in errors.items():
         why = known[name] if isinstance(known[name], str) else "the reference is zero"
@@ -401,7 +401,7 @@ def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     from ..reference.small_strain import ReferenceNotConvergedError
 
     if (count := len(scene.mesh.points)) > SEARCHED_PARTICLES:
-        return dict.fromkeys([one.name for one in scene.case.quantities], TOO_MANY.format(count, SEARCHED_PARTICLES))
+        return dict.fromkeys([one.name for one in scene.case.quantities], SIZE_REASON.format(count, SEARCHED_PARTICLES))
     linear = ShapeProblem(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear", scene.cache)
     try:
         values = linear.reference_values()

@@ -97,7 +97,7 @@ class Terms:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each of the values."""
+        """Unit of each value."""
         return VALUES[self.kind]
 
     @property
@@ -305,7 +305,7 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
 
 
 def network_of(net: Net, reference: float, energies: Callable[[Net, float], list[Energy]] | None = None) -> Network:
-    """The network that a net was written from; everything over the reference stiffness."""
+    """Network from which a net was written; all stiffnesses are over the reference stiffness."""
     mesh = Mesh(net.points, net.triangles, net.quads)
     if not np.array_equal(mesh.edges, net.springs):
         raise ValueError("springs: are not the edges of the cells in their order; write the springs of a scene anew")

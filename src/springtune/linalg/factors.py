@@ -160,11 +160,11 @@ def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | Cho
     return factor or SuperLUFactor(matrix)
 
 
-CLEAR = 100.0  # smallest ratio of an eigenvalue of T to its error for which its sign counts
+LEAST_SIGN_RATIO = 100.0  # smallest ratio of an eigenvalue of T to its error for which its sign counts
 
 BACKWARD_ERROR = 1e-15  # residual over what rounding of the solution makes of it, above which a solve is corrected
 
-PIN = 4.0  # stiffness of a pin over the largest entry of the diagonal
+PIN_STIFFNESS = 4.0  # stiffness of a pin over the largest entry of the diagonal
 
 
 class PinnedFactor:
@@ -194,7 +194,7 @@ class PinnedFactor:
         left = -(matrix @ mode)
         left[pins] += vectors[:, least] - stiffness * mode[pins]
         error = abs(mode @ left) + np.finfo(float).eps * self._size * (mode @ mode)
-        self.certain = abs(values[least]) > CLEAR * error
+        self.certain = abs(values[least]) > LEAST_SIGN_RATIO * error
         self._inverse = (vectors / values) @ vectors.T if self.certain else vectors
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -221,7 +221,7 @@ class PinnedFactor:
 
 def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np.ndarray]) -> PinnedFactor | None:
     """Factorize an indefinite matrix with a full diagonal and ascending rows; None if no choice of pins helps."""
-    stiffness = PIN * float(np.abs(matrix.diagonal()).max())
+    stiffness = PIN_STIFFNESS * float(np.abs(matrix.diagonal()).max())
     for pins in choices:
         pinned = matrix.copy()
         pinned[pins, pins] = matrix.diagonal()[pins] + stiffness
@@ -239,7 +239,7 @@ def entry_places(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.repeat(unknowns, width, axis=1).ravel(), np.tile(unknowns, width).ravel()
 
 
-LEAF = 48  # particles of a part that is not cut any more
+PART_PARTICLES = 48  # particles of a part that is not cut any more
 
 
 def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
@@ -254,7 +254,7 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     waiting = [(np.arange(count), 0)]
     while waiting:
         part, start = waiting.pop()
-        if len(part) <= LEAF:
+        if len(part) <= PART_PARTICLES:
             order[start : start + len(part)] = part
             continue
         x, y = points[part, 0], points[part, 1]
@@ -278,13 +278,13 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _joined(count: int, edges: np.ndarray) -> csr_array:
-    """Neighbours of each particle, in a row."""
+    """Neighbours of each particle, one particle's after another's."""
     first, second = edges.T
     ones = np.ones(2 * len(edges), dtype=np.int8)
     return csr_array((ones, (np.r_[first, second], np.r_[second, first])), shape=(count, count))
 
 
-def narrow(count: int, edges: np.ndarray) -> np.ndarray:
+def narrow_order(count: int, edges: np.ndarray) -> np.ndarray:
     """Return reversed Cuthill-McKee's order if it at least halves the bandwidth, else the numbers unchanged."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -294,7 +294,7 @@ def narrow(count: int, edges: np.ndarray) -> np.ndarray:
     return order if 2 * after <= before else np.arange(count)
 
 
-def spread(points: np.ndarray, count: int) -> np.ndarray:
+def spread_particles(points: np.ndarray, count: int) -> np.ndarray:
     """Return up to `count` particles spread over a mesh, in ascending order."""
     parts = [np.arange(len(points))]
     while len(parts) < count and len(points) >= 2 * len(parts):

@@ -183,7 +183,7 @@ def restrict(first: int, last: int, matrix: Chunks, grid: Grid, excess: Field, c
 
 @compiled
 def prolong(first: int, last: int, matrix: Chunks, grid: Grid, coarse: Field, u: Field, known: Field) -> None:
-    """Add what is interpolated from the nodes of a grid to `u`, and set `known` to zero."""
+    """Add the interpolation from the nodes of a grid to `u`, and set `known` to zero."""
     height = grid.shape[1]
     for i in range(matrix.starts[first], matrix.starts[last]):
         corner, right, up = grid.cells[i, 0] * height + grid.cells[i, 1], grid.at[i, 0], grid.at[i, 1]

@@ -21,20 +21,20 @@ STEP_RESIDUAL = 1e-6  # residual at which a solve for a step of Newton's method 
 
 MAX_CG_ITERATIONS = 300
 
-CERTAIN = 1e-7
+CERTAIN_RESIDUAL = 1e-7
 """Residual over a random right-hand side below which every direction has been met.
 
 Of two million unknowns, with shares of deviation ``n**-0.5``, one is below this in one case of 10 000.
 """
 
-COARSENING = 3.0
+FINEST_SPACING = 3.0
 """Spacing of the finest grid over the mesh size; of a grid of 2 the product takes longer than it saves steps."""
 
-COARSEST = 500  # unknowns below which the coarsest matrix is factorized, as a dense one
+DENSE_UNKNOWNS = 500  # unknowns below which the coarsest matrix is factorized, as a dense one
 
-MOST_BORROWED = 50  # iterations with another matrix's grids above which building own grids is faster
+MOST_BORROWED_ITERATIONS = 50  # iterations with another matrix's grids above which building own grids is faster
 
-IN_LINE = 1e-14  # determinant of a particle's own stiffness over the product of its diagonal that counts as rounding
+LEAST_DETERMINANT = 1e-14  # determinant of a particle's own stiffness over its diagonal's product; less is rounding
 
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
@@ -83,7 +83,7 @@ class Multigrid:
     ) -> None:
         self._assemble, self._otherwise, self._points, self._besides = assemble, otherwise, points, besides
         matrix = assemble()
-        self._held, self._places, self._product = held, np.flatnonzero(~held), chunked(matrix)
+        self._held, self._places, self._product = held, np.flatnonzero(~held), cut_rows(matrix)
         self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
@@ -94,22 +94,22 @@ class Multigrid:
             self._lay_grids(matrix)
 
     def _lay_grids(self, matrix: Blocks) -> None:
-        """Levels, and unknowns and dense factor of the coarsest one; neither if the matrix is not positive definite."""
+        """Make the levels and the dense factor of the coarsest one; none if the matrix is not positive definite."""
         self._borrowed, self._levels, self._coarsest = False, [], None
-        grid, places = first_grid(self._points, COARSENING), self._places
+        grid, places = first_grid(self._points, FINEST_SPACING), self._places
         # Sweeps over positive diagonals, and a coarsest matrix with a factor, make a positive definite
         # preconditioner, whatever the matrix is. With another one conjugate gradients may end and have met nothing.
         if not (matrix.diagonal[:, ::2].ravel()[places] > 0).all():
             return
         try:
-            while len(places) > COARSEST and len(self._levels) < MOST_LEVELS:
+            while len(places) > DENSE_UNKNOWNS and len(self._levels) < MOST_LEVELS:
                 coarse, chunks = galerkin(matrix, grid), smoother(matrix)
                 nodes = np.zeros((len(chunks.starts) - 1, grid.shape[0] * grid.shape[1], 2), np.float32)
                 fields = np.zeros((2, *grid.cells.shape), np.float32)
                 self._levels.append((chunks, grid, (*fields, nodes)))
                 matrix, grid = coarse, next_grid(grid.shape)
                 places = np.flatnonzero(matrix.diagonal[:, ::2])
-            self._coarsest = places, cho_factor(dense(matrix)[np.ix_(places, places)])
+            self._coarsest = places, cho_factor(as_dense(matrix)[np.ix_(places, places)])
         except LinAlgError:
             self._levels = []
 
@@ -170,11 +170,11 @@ class Multigrid:
         solution, size = np.zeros(missing.shape), float(np.linalg.norm(missing))
         if size == 0.0:
             return solution
-        proves = not self._certain and tolerance <= CERTAIN
+        proves = not self._certain and tolerance <= CERTAIN_RESIDUAL
         if proves:
             xx, xy, yy = self._product.diagonal.T
             product = np.where(self._held[:, 0], 1.0, xx) * np.where(self._held[:, 1], 1.0, yy)
-            if (abs(product - xy**2) <= IN_LINE * abs(product)).any():
+            if (abs(product - xy**2) <= LEAST_DETERMINANT * abs(product)).any():
                 raise SingularError("a particle is free to move: its springs, if any, are in one line")
         if self._coarsest is None:
             raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
@@ -192,7 +192,7 @@ class Multigrid:
             if squares.sum() ** 0.5 <= tolerance * size:
                 self._certain |= proves
                 return solution
-            if self._borrowed and count == MOST_BORROWED:
+            if self._borrowed and count == MOST_BORROWED_ITERATIONS:
                 self._lay_grids(self._assemble())
                 return solution + self._gradients(missing, tolerance * size / float(np.linalg.norm(missing)))
             # The weight is in units of the scaled residual, as the preconditioner is linear.
@@ -210,10 +210,10 @@ class Multigrid:
 
     @cached_property
     def negative_pivots(self) -> int:
-        """0 if the matrix is positive definite, else 1, see `CERTAIN`; only a factor that takes over counts them."""
+        """Return 0 if the matrix is positive definite, else 1, or the count of a factor that took over."""
         if not self._certain and self._direct is None:
             try:
-                self.solve(np.random.default_rng(1).standard_normal(len(self._places)), CERTAIN)
+                self.solve(np.random.default_rng(1).standard_normal(len(self._places)), CERTAIN_RESIDUAL)
             except IndefiniteError:
                 return 1
         return 0 if self._direct is None else self._direct.negative_pivots
@@ -256,8 +256,8 @@ def galerkin(matrix: Blocks, grid: Grid) -> Blocks:
     return Blocks(row_pointers(rows, nodes), columns.astype(np.int32), blocks, diagonal)
 
 
-def dense(matrix: Blocks) -> np.ndarray:
-    """Return the matrix as a full one."""
+def as_dense(matrix: Blocks) -> np.ndarray:
+    """Return the matrix as a dense array."""
     count = len(matrix.diagonal)
     blocks = matrix.blocks.reshape(-1, 2, 2)
     right = bsr_array((blocks, matrix.columns, matrix.pointers), shape=(2 * count, 2 * count)).toarray()
@@ -266,7 +266,7 @@ def dense(matrix: Blocks) -> np.ndarray:
     return full
 
 
-def chunked(matrix: Blocks, dtype: Any = float) -> Chunks:
+def cut_rows(matrix: Blocks, dtype: Any = float) -> Chunks:
     """Cut the rows of a matrix into chunks."""
     count = len(matrix.diagonal)
     chunks = CHUNKS if count >= CHUNKS * ROWS_PER_CHUNK else 1
@@ -284,12 +284,12 @@ def chunked(matrix: Blocks, dtype: Any = float) -> Chunks:
 
 
 def smoother(matrix: Blocks) -> Chunks:
-    """Return what Gauss-Seidel sweeps need, in single precision; raise LinAlgError if a diagonal block is not positive.
+    """Return a matrix for Gauss-Seidel sweeps, in single precision; refuse indefinite diagonal blocks.
 
     Chunks are coupled by Jacobi's method. Half the size of these couplings is added to the diagonal, which keeps any
     preconditioner positive definite (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864, 2011).
     """
-    chunks, added = chunked(matrix, np.float32), np.zeros((len(matrix.diagonal), 2))
+    chunks, added = cut_rows(matrix, np.float32), np.zeros((len(matrix.diagonal), 2))
     sizes = 0.5 * np.abs(chunks.blocks_between.astype(float).reshape(-1, 2, 2))
     np.add.at(added, chunks.rows_between, sizes.sum(axis=2))
     np.add.at(added, chunks.columns_between, sizes.sum(axis=1))
@@ -305,7 +305,7 @@ def smoother(matrix: Blocks) -> Chunks:
 
 
 def first_grid(points: np.ndarray, coarsening: float) -> Grid:
-    """Regular grid over points (n_points, 2) [m], with a spacing of so many times their mean distance."""
+    """Regular grid over points (n_points, 2) [m], whose spacing is `coarsening` times their mean distance."""
     lowest, extent = points.min(axis=0), np.ptp(points, axis=0)
     spacing = coarsening * np.sqrt(extent.prod() / len(points))
     counts = np.maximum(1, np.round(extent / spacing)).astype(np.int32)

@@ -14,7 +14,7 @@ IMPLICIT = ("backward-euler", "implicit-midpoint")
 
 INTEGRATORS = (*EXPLICIT, *IMPLICIT)
 
-LAGGED = ("symplectic-euler", "central-difference-lagged")
+LAGGED_INTEGRATORS = ("symplectic-euler", "central-difference-lagged")
 """Schemes in which all damping lags, which reduces the stable step."""
 
 PRECISIONS = ("float64", "float32")  # floating-point numbers that explicit schemes compute in

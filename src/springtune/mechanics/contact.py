@@ -61,7 +61,7 @@ FRICTION_SLIP = 1e-3
 
 
 class ContactError(RuntimeError):
-    """A scene of contact that has no solution near the last good load step; the message says which."""
+    """Contact has no equilibrium near the last good load step; the message says which."""
 
 
 def oriented_outline(mesh: Mesh) -> np.ndarray:

@@ -64,7 +64,7 @@ def next_point(
 
 
 def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, scale: float) -> Point | None:
-    """Newton's method in the plane across an increment; None where it does not converge."""
+    """Run Newton's method in the plane across an increment; return None if it does not converge."""
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
     for step in range(1, MOST_POINT_STEPS + 1):
@@ -150,7 +150,7 @@ def continue_path(
 
 
 def _limit_load(way: list[float], loads: list[float]) -> float:
-    """Largest load of a path whose last point falls: that of the parabola through its last three points, if it is."""
+    """Return the largest load of a path whose last load is smaller, by a parabola through its last three points."""
     if len(way) < 3:
         return loads[-2]
     square, slope, _ = np.polyfit(np.subtract(way[-3:], way[-2]), np.subtract(loads[-3:], loads[-2]), 2)
@@ -198,7 +198,7 @@ def follow(
 
 
 class Buckling(NamedTuple):
-    """A buckling load over the reference stiffness [m], and what restricts it; nothing where the path bifurcates."""
+    """Buckling load over the reference stiffness [m], and a message if it is no bifurcation."""
 
     load: float
     message: str

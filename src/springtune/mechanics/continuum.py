@@ -283,15 +283,15 @@ def particle_stresses(
     around = np.bincount(particle, minlength=count)
     sources = inside
     while True:
-        wanted = (around > 0) & np.isnan(found[:, 0])
-        if not wanted.any():
+        missing = (around > 0) & np.isnan(found[:, 0])
+        if not missing.any():
             return found
-        to, of = joined[wanted[joined[:, 0]] & sources[joined[:, 1]]].T
+        to, of = joined[missing[joined[:, 0]] & sources[joined[:, 1]]].T
         if not len(to):
             # No particle inside: the fits to the cells around, or their mean.
             total = np.stack([np.bincount(particle, part, count) for part in value.T], axis=1)
-            mean = total[wanted] / around[wanted, None]
-            found[wanted] = np.where(good[wanted, None], fits[wanted, 0], mean)
+            mean = total[missing] / around[missing, None]
+            found[missing] = np.where(good[missing, None], fits[missing, 0], mean)
             return found
         apart = (mesh.points[to] - mesh.points[of]) / size
         reached = fits[of, 0] + apart[:, :1] * fits[of, 1] + apart[:, 1:] * fits[of, 2]
@@ -309,7 +309,7 @@ def particle_stresses(
 def _fits(
     points: np.ndarray, particle: np.ndarray, middle: np.ndarray, value: np.ndarray, count: int, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Linear field about each particle, value and slopes over `size`, shape (n_points, 3, 3), and where it is one."""
+    """Fit a linear field about each particle: value and slopes over `size`, (n_points, 3, 3), and where it exists."""
     basis = np.concatenate([np.ones((len(particle), 1)), (middle - points[particle]) / size], axis=1)
     matrix, right = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     for i in range(3):

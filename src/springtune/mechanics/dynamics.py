@@ -18,7 +18,7 @@ from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
 from ..mesh.sheets import free_motion
 from ..safe_io import Tabled
-from . import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
+from . import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED_INTEGRATORS, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
 from .statics import StaticProblem
@@ -103,7 +103,7 @@ class Motion(Moving):
         """
         if integrator in IMPLICIT:
             return np.inf
-        alpha = self.mass_damping if integrator in LAGGED else 0.0
+        alpha = self.mass_damping if integrator in LAGGED_INTEGRATORS else 0.0
         if self.dampers is None:
             # All modes share alpha, so the highest one goes first.
             xi = 0.5 * alpha / self.omega_max
@@ -262,7 +262,7 @@ class Motion(Moving):
         if at_rest:
             status, message = self.judge_rest(u)
             if status == "unstable" and integrator == "backward-euler":
-                message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
+                message += "; take smaller steps, since large ones can rest at an unstable equilibrium"
             return status, message
         if residual is None:
             return "moving", ""
@@ -287,9 +287,9 @@ class Motion(Moving):
             return "unstable", f"at rest on a limit point, where the tangent is singular ({error}); use another load"
         if not pivots:
             why = "" if self.linear else StaticProblem(network, self.load).departure(1.0, displacements)
-            return "rest", f"at rest where a load that grows slowly does not lead: {why}" if why else ""
-        why = f"{pivots} negative pivot{'s' * (pivots > 1)}: the least push would end it"
-        remedy = "push the body sideways, by a force of a thousandth of the load, say, and run again"
+            return "rest", f"at rest in an equilibrium that a slowly growing load does not reach: {why}" if why else ""
+        why = f"{pivots} negative pivot{'s' * (pivots > 1)}: any disturbance ends it"
+        remedy = "disturb the body, such as sideways by a thousandth of the load, and run again"
         return "unstable", f"at rest on an unstable equilibrium ({why}); {remedy}"
 
 

@@ -28,13 +28,13 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def following(field: np.ndarray) -> np.ndarray:
-    """Values at the next corner of each."""
+def next_of(field: np.ndarray) -> np.ndarray:
+    """Values at the next corner of each corner."""
     return field.take(range(1 - field.shape[-2], 1), axis=-2)
 
 
-def preceding(field: np.ndarray) -> np.ndarray:
-    """Values at the corner before each."""
+def previous_of(field: np.ndarray) -> np.ndarray:
+    """Values at the previous corner of each corner."""
     return field.take(range(-1, field.shape[-2] - 1), axis=-2)
 
 
@@ -45,7 +45,7 @@ def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def area_slopes(positions: np.ndarray) -> np.ndarray:
     """Derivative of each cell's area by each corner: half the vector between its neighbours, turned outwards."""
-    x, y = 0.5 * (following(positions) - preceding(positions))
+    x, y = 0.5 * (next_of(positions) - previous_of(positions))
     return np.stack([y, -x])
 
 
@@ -62,11 +62,11 @@ class Energy(ABC):
 
     @abstractmethod
     def _forces(self, moved: np.ndarray) -> np.ndarray:
-        """Its derivative by the corners' positions [m], shape (2, m, n_cells)."""
+        """Derivative of the energy by the corners' positions [m], shape (2, m, n_cells)."""
 
     @abstractmethod
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
-        """Its second derivatives by two corners, as of `couplings`."""
+        """Second derivatives of the energy by two corners, see `couplings`."""
 
     def value(self, displacements: np.ndarray) -> float:
         """Energy over the reference stiffness [m2] at displacements of shape (n_points, 2)."""
@@ -145,7 +145,7 @@ class Energy(ABC):
     def _growth(self, moved: np.ndarray) -> np.ndarray:
         """Growth of each cell's area [m2], which is quadratic in the positions."""
         moved = moved - moved[:, :1]
-        return (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0)
+        return (dot(self._rest_slopes, moved) + 0.5 * cross(moved, next_of(moved))).sum(axis=0)
 
     def _at_corners(self, field: np.ndarray) -> np.ndarray:
         return np.take(np.ascontiguousarray(field.T), self.corners.T, axis=1)
@@ -196,7 +196,7 @@ class AngleEnergy(Energy):
 
     def _change(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Change of each angle [rad], and the vectors from each corner to the next and to the one before."""
-        (a, b), (da, db) = ((following(field) - field, preceding(field) - field) for field in (self._rest, moved))
+        (a, b), (da, db) = ((next_of(field) - field, previous_of(field) - field) for field in (self._rest, moved))
         sine, cosine = cross(a, b), dot(a, b)
         more_sine = cross(da, b) + cross(a, db) + cross(da, db)
         more_cosine = dot(da, b) + dot(a, db) + dot(da, db)
@@ -216,7 +216,7 @@ class AngleEnergy(Energy):
     def _forces(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
         to_next, to_last = (self._stiffness * change * slope for slope in self._slopes(a, b))
-        return preceding(to_next) + following(to_last) - to_next - to_last
+        return previous_of(to_next) + next_of(to_last) - to_next - to_last
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
@@ -254,7 +254,7 @@ class BiquadraticEnergy(Energy):
     @staticmethod
     def _sides(field: np.ndarray) -> np.ndarray:
         """Side opposite each corner: from the next corner to the one before."""
-        return preceding(field) - following(field)
+        return previous_of(field) - next_of(field)
 
     @cached_property
     def _halves(self) -> tuple[np.ndarray, np.ndarray | None]:
@@ -270,7 +270,7 @@ class BiquadraticEnergy(Energy):
         pull = tensile * change
         if coupling is not None:
             # Corner i couples the sides opposite i + 1 and i + 2.
-            pull += preceding(coupling * following(following(change))) + following(coupling * following(change))
+            pull += previous_of(coupling * next_of(next_of(change))) + next_of(coupling * next_of(change))
         return rest + relative, change, pull
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
@@ -280,7 +280,7 @@ class BiquadraticEnergy(Energy):
     def _forces(self, moved: np.ndarray) -> np.ndarray:
         sides, _, pull = self._stresses(moved)
         along = 2 * pull * sides
-        return following(along) - preceding(along)
+        return next_of(along) - previous_of(along)
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
         sides, _, pull = self._stresses(moved)

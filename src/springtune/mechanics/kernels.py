@@ -56,24 +56,24 @@ def _acquire(context: Any, array: Any) -> Any:
     return types.int64(array), code
 
 
-_tell: Any = intrinsic(_release)  # store the first number of an array after all previous writes (release)
+_store_release: Any = intrinsic(_release)  # store the first number of an array after all previous writes (release)
 
-_told: Any = intrinsic(_acquire)  # load the first number of an array before all later reads (acquire)
+_load_acquire: Any = intrinsic(_acquire)  # load the first number of an array before all later reads (acquire)
 
 
 @compiled
 def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: int, distance: int) -> bool:
-    """Wait until the pass before is so many blocks ahead; False if it never will be."""
+    """Wait until the pass before is far enough ahead; return False if it never will be."""
     threads = len(progress) - 1
     if threads == 1 or number == 0:
         return True
     ahead = (number - 1) % threads
     least = (number - 1) // threads * blocks + min(blocks, block + 1 + distance)
     looks = 0
-    while _told(progress[ahead]) < least:
+    while _load_acquire(progress[ahead]) < least:
         looks += 1
         if looks > CHECKS_BEFORE_YIELD:
-            if _told(progress[threads]):
+            if _load_acquire(progress[threads]):
                 return False
             _yield()
     return True
@@ -81,7 +81,7 @@ def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: 
 
 @compiled
 def _passes(count: int, size: int, depth: int, bandwidth: int) -> tuple[int, int]:
-    """Blocks of a pass over so many rows, and those that the next pass stays behind."""
+    """Return the blocks of a pass, and by how many blocks the next pass stays behind."""
     return (count + (depth - 1) * bandwidth + size - 1) // size, (depth * bandwidth + size - 1) // size
 
 
@@ -156,7 +156,7 @@ def advance_springs(
                     v[i, 0], v[i, 1] = vx, vy
                     u[i, 0], u[i, 1] = u[i, 0] + step * vx, u[i, 1] + step * vy
                     force[i, 0], force[i, 1] = load[i, 0], load[i, 1]
-            _tell(progress[thread], number // threads * blocks + block + 1)
+            _store_release(progress[thread], number // threads * blocks + block + 1)
 
 
 @compiled
@@ -186,4 +186,4 @@ def advance_matrix(
                             total -= dampers[n] * v[c, indices[n]]
                     v[d, i] = keep * v[c, i] + gain[i] * total
                     u[b, i] = u[a, i] + step * v[d, i]
-            _tell(progress[thread], number // threads * blocks + block + 1)
+            _store_release(progress[thread], number // threads * blocks + block + 1)

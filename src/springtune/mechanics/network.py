@@ -66,8 +66,8 @@ class FollowerPressure:
     def of_side(cls, mesh: Mesh, edges: np.ndarray, axis: int) -> "FollowerPressure":
         """Return the pressure on a straight side of total force 1 at rest; `edges` (n, 2) may run either way."""
         along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
-        wanted = 1 if axis == 0 else -1
-        turned = np.where((wanted * along < 0)[:, None], edges[:, ::-1], edges)
+        sign = 1 if axis == 0 else -1
+        turned = np.where((sign * along < 0)[:, None], edges[:, ::-1], edges)
         return cls(mesh, turned, 1.0 / np.abs(along).sum())
 
     @cached_property
@@ -339,7 +339,7 @@ class Network:
 
     @property
     def _by_multigrid(self) -> bool:
-        """Whether multigrid solves what is not factorized by Cholesky's method."""
+        """Whether multigrid solves matrices that Cholesky's method does not factorize."""
         return self.solver == "multigrid" or self.solver is None and self.unknowns > MULTIGRID_FROM_UNKNOWNS
 
     def is_stable(self, displacements: np.ndarray, follower: tuple[float, FollowerPressure] | None = None) -> bool:

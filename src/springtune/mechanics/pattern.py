@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from ..linalg.factors import Analysis, entry_places, nested_dissection, spread
+from ..linalg.factors import Analysis, entry_places, nested_dissection, spread_particles
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
 
@@ -92,7 +92,7 @@ class Pattern:
     @cached_property
     def pins(self) -> list[np.ndarray]:
         """Unknowns to pin where the matrix is indefinite: those of particles spread over the mesh."""
-        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PIN_COUNTS)
+        chosen = (self.number[spread_particles(self.mesh.points, count)].ravel() for count in PIN_COUNTS)
         return [pins[pins >= 0] for pins in chosen]
 
     @cached_property
@@ -121,7 +121,7 @@ class Pattern:
         return vectors.ravel()[self.places]
 
     def sum_springs(self, at_first: np.ndarray, at_second: np.ndarray | None = None) -> np.ndarray:
-        """Sum over springs of what is added at their first ends and taken off at their second, by default the same."""
+        """Sum values of springs at particles: added at first ends, subtracted at second ends, by default the same."""
         count = self.shape[0]
         at_second = at_first if at_second is None else at_second
         total = np.empty(self.shape)
@@ -131,7 +131,7 @@ class Pattern:
         return total
 
     def sum_cells(self, corners: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Sum over cells of what is added at their corners, shape (n_cells, m, 2)."""
+        """Sum values at the corners of cells, shape (n_cells, m, 2), at particles."""
         places = corners.T.ravel()
         total = [np.bincount(places, forces[:, :, axis].T.ravel(), self.shape[0]) for axis in range(2)]
         return np.stack(total, axis=1)

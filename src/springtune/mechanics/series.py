@@ -147,7 +147,7 @@ class StablePath:
         return next(series for series, last in self._series if load <= last)
 
     def _corrected(self, s: float, value: float, displacements: np.ndarray, factor: Factor, stable: bool) -> _Point:
-        """A predicted point, corrected by steps with one tangent; its error is that of a value."""
+        """Correct a predicted point by steps with one tangent; its error is that of a value."""
         network = self.problem.network
         size = before = np.inf
         for _ in range(MAX_CORRECTIONS):
@@ -287,7 +287,7 @@ class StablePath:
         return s, *self._solve(s, self._far.displacements)
 
     def _advance(self, load: float) -> None:
-        """One more step along the path, towards a load."""
+        """Take one more step along the path, towards a load."""
         s, displacements, factor = self._last_point()
         if factor is None:
             self.end = "no stable equilibrium found"

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg
 
-from ..linalg.factors import Factor, factorize, narrow
-from . import EXPLICIT, LAGGED, BackwardEuler
+from ..linalg.factors import Factor, factorize, narrow_order
+from . import EXPLICIT, LAGGED_INTEGRATORS, BackwardEuler
 from .network import Network
 
 LEAST_ENTRIES_A_THREAD = 5000
@@ -139,7 +139,7 @@ class _ExplicitSteps(Stepper):
         with np.errstate(divide="ignore"):
             self.inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
         half = 0.5 * motion.mass_damping * step
-        if integrator in LAGGED:
+        if integrator in LAGGED_INTEGRATORS:
             keep, gain = 1 - 2 * half, step * self.inverse
         else:
             keep, gain = (1 - half) / (1 + half), step * self.inverse / (1 + half)
@@ -208,7 +208,7 @@ class _ExplicitSteps(Stepper):
         mesh = self.motion.network.mesh
         # Where all of them are next to the processor anyway, none are advanced before others.
         count = len(mesh.points)
-        order = narrow(count, mesh.edges) if len(mesh.edges) > LEAST_ENTRIES_A_THREAD else np.arange(count)
+        order = narrow_order(count, mesh.edges) if len(mesh.edges) > LEAST_ENTRIES_A_THREAD else np.arange(count)
         return order, np.argsort(order)
 
     def begin(self, u: np.ndarray, v: np.ndarray) -> None:
@@ -312,7 +312,7 @@ def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, 
 
 
 def _deepest(each: float, bandwidth: int) -> int:
-    """Steps of a pass whose rows, of so many bytes each, find room in a cache."""
+    """Return the steps of a pass whose rows fit into a cache."""
     return int(np.clip((CACHE_BYTES / each - BLOCK_ROWS) / bandwidth, 1, MOST_PASS_STEPS))
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import MeshError
-from .sheets import Content, places
+from .sheets import Content, find_tags
 
 OTHER_FILES_REASON = "parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
 """Why a file is refused that names other files."""
@@ -127,14 +127,14 @@ class _Model:
     def _members(self, one: _Section) -> np.ndarray:
         """Numbers of points or cells in a set, by numbers, ranges and names of sets before it."""
         found = [np.zeros(0, dtype=np.int64)]
-        wanted = [("ELSET", one.given["ELSET"])] if one.keyword == "NSET" and "ELSET" in one.given else []
+        named_sets = [("ELSET", one.given["ELSET"])] if one.keyword == "NSET" and "ELSET" in one.given else []
         for row in one.rows:
             numbers = [int(item) for item in row if item.isdigit()]
             if "GENERATE" in one.given:
                 numbers = [*range(numbers[0], numbers[1] + 1, (*numbers, 1)[2])]
             found.append(np.array(numbers, dtype=np.int64))
-            wanted += [(one.keyword, item) for item in row if item and not item.isdigit()]
-        for kind, name in wanted:
+            named_sets += [(one.keyword, item) for item in row if item and not item.isdigit()]
+        for kind, name in named_sets:
             if not (before := self.sets.get((kind, name.upper()))):
                 raise one.refused(f"has the set '{name}', which is not before it; put it there")
             members = np.concatenate(before)
@@ -146,10 +146,10 @@ class _Model:
         return [rows[np.isin(rows[:, 0], cells), 1:] for _, rows in self.elements]
 
     def content(self) -> Content:
-        """Return all of it."""
+        """Return the content of the file."""
         table = np.array(self.points).reshape(-1, 4)
         tags = table[:, 0].astype(np.int64)
-        corners = places(tags, [rows[:, 1:] for _, rows in self.elements])
+        corners = find_tags(tags, [rows[:, 1:] for _, rows in self.elements])
         content = Content(table[:, 1:], [(kind, found) for (kind, _), found in zip(self.elements, corners)])
         for name in self.surfaces:
             if name.upper() not in self.shown:
@@ -173,7 +173,7 @@ class _Model:
             if not np.isin(chosen, known).all():
                 content.unusable[shown] = "has what is not in the file; remove this"
             elif kind == "NSET":
-                content.point_groups[shown] += places(tags, [chosen])
+                content.point_groups[shown] += find_tags(tags, [chosen])
             elif name in parts and self.ranks[name] < best:
                 content.unusable[shown] = "is no part, as others have a `*SOLID SECTION` or an `*ELSET`; use these"
             else:

@@ -23,7 +23,7 @@ def no_cells(corners: int) -> np.ndarray:
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be used; the message gives the reason and the remedy.
+    """A mesh cannot be used; the message gives the reason and the remedy.
 
     Examples
     --------
@@ -107,7 +107,7 @@ class Mesh:
             object.__setattr__(self, name, _array(getattr(self, name), name, count, kind))
         points = self.points
         if len(lost := np.flatnonzero(~np.isfinite(points).all(axis=1))):
-            raise MeshError(f"points: {len(lost)} are nowhere, the first one {lost[0]}; give finite coordinates in m")
+            raise MeshError(f"points: {len(lost)} have no coordinates, the first one {lost[0]}; give finite ones in m")
         if not self.cells:
             raise MeshError("there are no cells; give triangles, quads or both")
         for count, corners in self.cells.items():
@@ -244,7 +244,7 @@ class Mesh:
 
 
 def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
-    """Array of so many columns, of a kind of number."""
+    """Return an array of `columns` columns of a kind of number; refuse other shapes."""
     try:
         given = np.asarray(values)
         fits = given.ndim == 2 and given.shape[1] == columns and given.dtype.kind in ("iuf" if kind is float else "iu")
@@ -297,8 +297,8 @@ def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return 0.5 * sum(x[i] * y[i + 1] - x[i + 1] * y[i] for i in range(len(x) - 1))
 
 
-def upright(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Cells with clockwise ones turned."""
+def counter_clockwise(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return cells counter-clockwise: clockwise ones in reverse order."""
     return np.where((signed_areas(points, corners) < 0)[:, None], corners[:, ::-1], corners)
 
 

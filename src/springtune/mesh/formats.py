@@ -12,7 +12,7 @@ import numpy as np
 from ..registry import NAME, NAME_RULE
 from ..safe_io import DataElsewhere, bounded, check_alone, check_folder, replacing, why_unreadable
 from . import abaqus, gmsh
-from .cells import Mesh, MeshError, no_cells, signed_areas, upright
+from .cells import Mesh, MeshError, counter_clockwise, no_cells, signed_areas
 from .sheets import COORDINATE_TOLERANCE, Content, GroupedMesh, box_fault, on_sides, outline_of, part_names, sheet_fault
 from .sides import in_words
 
@@ -63,7 +63,7 @@ def library() -> Any:
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     """Write a mesh atomically as ``.vtu``, with its groups as cell data; `springtune.read_shape` reads them."""
     if Path(path).suffix != ".vtu":
-        raise MeshError(f"{path}: is not to end in '{Path(path).suffix}'; give a name that ends in .vtu")
+        raise MeshError(f"{path}: cannot end in '{Path(path).suffix}'; give a name that ends in .vtu")
     check_folder(path)
     grouped = mesh if isinstance(mesh, GroupedMesh) else GroupedMesh(mesh)
     mesh = grouped.mesh
@@ -118,7 +118,7 @@ def _build_mesh(
     with np.errstate(over="ignore"):  # what is too far away is refused
         points = _read_points(path, unit * content.points, used)
     for count, corners in cells.items():
-        cells[count] = corners = upright(points, np.searchsorted(used, corners))
+        cells[count] = corners = counter_clockwise(points, np.searchsorted(used, corners))
         areas = signed_areas(points, corners)
         if len(flat := corners[areas <= 1e-12 * areas.max(initial=0.0)]):
             first = in_words(points[flat[0]])
@@ -151,8 +151,8 @@ def _file_content(path: str | Path) -> Content:
         raise MeshError(str(error)) from None
     except (Exception, SystemExit) as error:
         message = " ".join(str(error).split())[:MOST_MESSAGE_CHARACTERS]
-        shown = f" ({message})" if re.search(r"\w{2} \S", message) else ""  # a key alone tells nothing
-        why = f"it is damaged, or has what is not supported{shown}; write it again, in text, or as .vtu"
+        detail = f" ({message})" if re.search(r"\w{2} \S", message) else ""  # a key alone tells nothing
+        why = f"it is damaged, or has what is not supported{detail}; write it again, in text, or as .vtu"
         raise MeshError(f"{path}: cannot be read: {why}") from None
 
 
@@ -190,7 +190,7 @@ def _read_vtu(raw: bytes) -> Content:
 
 
 def _by_meshio(found: Any) -> Content:
-    """Content of what meshio read: its groups are sets, numbers in cell data, and marks of zeros and ones."""
+    """Content of a file read by meshio: groups are sets, numbers in cell data, and marks of zeros and ones."""
     points = np.asarray(found.points, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ValueError(f"coordinates of points of shape {points.shape}")
@@ -252,8 +252,8 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
     mesh = Mesh(mesh.points - mesh.points.min(axis=0), mesh.triangles, mesh.quads)
     extent = mesh.points.max(axis=0)
     if np.abs(extent / box - 1).max() > COORDINATE_TOLERANCE:
-        shown, wanted = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
-        raise MeshError(f"{path}: extends over {shown} mm, its beam over {wanted} mm; correct the unit or the beam")
+        of_file, of_beam = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
+        raise MeshError(f"{path}: extends over {of_file} mm, its beam over {of_beam} mm; correct the unit or the beam")
     try:
         mesh = on_sides(mesh, box)
     except MeshError as error:
@@ -327,7 +327,7 @@ class _Groups:
         if not NAME.fullmatch(name):
             raise MeshError(f"cannot be a name; {NAME_RULE}")
         if not mask.any() and not len(nodes):
-            raise MeshError("has nothing in the file; put something in it")
+            raise MeshError("is empty in the file; put sides, points or cells into it")
         if any(len(own) and not 0 <= own.min() <= own.max() < len(self.places) for own in (edges, nodes)):
             raise MeshError("has points that are not in the file; remove these")
         return edges, nodes, masks
@@ -347,10 +347,10 @@ class _Groups:
         if len(nodes) < 2:
             return sides
         edges = self.outline[np.isin(self.outline, self.particles[nodes]).all(axis=1)]
-        alone = ~np.isin(self.particles[nodes], edges)
-        if alone.any():
-            what = f"of its {len(nodes)} points {alone.sum()} are at the end of no side"
-            raise self._refusal(f"is neither one point nor sides: {what}", nodes[alone])
+        loose = ~np.isin(self.particles[nodes], edges)
+        if loose.any():
+            what = f"of its {len(nodes)} points {loose.sum()} are at the end of no side"
+            raise self._refusal(f"is neither one point nor sides: {what}", nodes[loose])
         if len(lines) and set(edges @ [base, 1]) != set(sides @ [base, 1]):
             raise MeshError("is lines and points in the file that are not the same sides; rename one")
         return edges

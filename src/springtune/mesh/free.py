@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .cells import Mesh, MeshError, check_box, mesh_type, signed_areas, too_many, upright
+from .cells import Mesh, MeshError, check_box, counter_clockwise, mesh_type, signed_areas, too_many
 from .rows import ROW_HEIGHT
 from .sheets import GroupedMesh
-from .sides import Point, Stretch, nearer, winds_about
+from .sides import Point, Stretch, near_edges, winds_about
 
 EDGE_FACTOR = 1.0 + 1e-9
-"""Edge imposed on netgen, over the wanted one: a side of n edges exactly shall not be split into n + 1 by rounding."""
+"""Edge imposed on netgen, over the requested one: rounding must not split a side of exactly n edges into n + 1."""
 
 
 class Triangulation(NamedTuple):
@@ -57,7 +57,7 @@ def triangulate(
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in elements], dtype=np.int64)
     return Triangulation(
         placed,
-        upright(placed, triangles.reshape(-1, 3)),
+        counter_clockwise(placed, triangles.reshape(-1, 3)),
         np.array([element.index for element in elements], dtype=np.int64),
         [(one.index - 1, *(vertex.nr - 1 for vertex in one.points)) for one in made.Elements1D()],
     )
@@ -112,7 +112,7 @@ def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None
 
 
 def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -> dict[str, float]:
-    """Mesh size by the name of what is refined, ``""`` for all else [m]."""
+    """Mesh size [m] by the name of a refined group, point or part; ``""`` for all else."""
     smaller, larger = sorted(np.ptp(shape.extent, axis=0).tolist())
     lengths: dict[str, float] = defaultdict(float)
     for one in shape.rounds:
@@ -153,7 +153,7 @@ def _divide_sides(shape: Outlined, sizes: Mapping[str, float]) -> tuple[list[Str
         inner = 0 if one.inner is None else 1 + number
         for side in one.sides:
             size = min(sizes.get(name, sizes[""]) for name in (side.group, one.inner or "", one.outer or ""))
-            on_it = side.find_on_it(shape.points, small)
+            on_it = side.find_points(shape.points, small)
             for name, parameter in on_it.items():
                 inside.pop(name, None)
                 place = side.at(parameter)
@@ -176,8 +176,8 @@ def _separate_chords(stretches: list[Stretch], name: str) -> list[Stretch]:
         numbers: dict[Point, int] = {}
         edges = np.array([[numbers.setdefault(one.side.at(end), len(numbers)) for end in (one.low, one.high)]
                           for one in stretches])  # fmt: skip
-        aside = np.array([one.side.aside(one.low, one.high) for one in stretches])
-        near = nearer(np.array(list(numbers)), edges, 3 * aside)
+        aside = np.array([one.side.chord_distance(one.low, one.high) for one in stretches])
+        near = near_edges(np.array(list(numbers)), edges, 3 * aside)
         halved = {*near[aside[near] > 0].tolist()}
         if not halved:
             return stretches

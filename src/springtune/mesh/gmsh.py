@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .cells import MeshError
-from .sheets import Content, places
+from .sheets import Content, find_tags
 
 LINEAR_CELLS_REMEDY = "write linear triangles and quadrilaterals only"  # remedy for cells that are not read
 
@@ -87,7 +87,7 @@ def read(raw: bytes) -> Content | None:
         found.append((ELEMENT_TYPES[kind][0], corners, own))
     if [len(tags), sum(len(corners) for _, corners, _ in found)] != [nodes.total, elements.total]:
         raise ValueError("it states other numbers of points or cells than it has")
-    placed = places(tags, [corners for _, corners, _ in found])
+    placed = find_tags(tags, [corners for _, corners, _ in found])
     content = Content(points, [(kind, own) for (kind, *_), own in zip(found, placed)])
     content.cell_groups |= {name: [] for name in names.values()}
     for (*_, own), (start, stop) in zip(found, pairwise(content.starts())):

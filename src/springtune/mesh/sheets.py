@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
-from .sides import edge_in_words, in_words, nearer, turn, winding
+from .sides import edge_in_words, in_words, near_edges, turn, winding
 
 COORDINATE_TOLERANCE = 1e-6
 """Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
@@ -28,7 +28,7 @@ def sheet_fault(mesh: Mesh) -> str:
     ways = np.diff(points[outline], axis=1)[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
     small = min(COORDINATE_TOLERANCE * np.ptp(points, axis=0).max(), 0.01 * lengths.min())
-    near = nearer(points, outline, np.full(len(outline), 0.5 * small)).ravel()
+    near = near_edges(points, outline, np.full(len(outline), 0.5 * small)).ravel()
     # Edges that share a point touch where the outline turns back on itself there.
     order, (x, y) = np.argsort(outline[:, 0]), (ways / lengths[:, None]).T
     low, high = (np.searchsorted(outline[order, 0], outline[:, 1], side) for side in ("left", "right"))
@@ -40,7 +40,7 @@ def sheet_fault(mesh: Mesh) -> str:
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
         first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"
-        return opening(points, outline[touching], count) or f"cells overlap ({first}); remove some"
+        return opening_fault(points, outline[touching], count) or f"cells overlap ({first}); remove some"
     if len(again := np.flatnonzero(np.bincount(outline[:, 0]) > 1)):
         where = in_words(points[again[0]])
         return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
@@ -78,7 +78,7 @@ def outline_of(mesh: Mesh) -> tuple[np.ndarray, str]:
     return np.stack(np.divmod(back, len(mesh.points))[::-1], axis=1), fault
 
 
-def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
+def opening_fault(points: np.ndarray, edges: np.ndarray, count: str) -> str:
     """Return why edges (n, 2) have one cell although others are near, with the remedy, or an empty string."""
     from scipy.spatial import cKDTree  # here, since a good mesh needs none
 
@@ -104,7 +104,7 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
 
 
 def rounds(edges: np.ndarray) -> list[np.ndarray]:
-    """Return closed rounds of edges, by the points on each in order; each point has one edge that leaves it."""
+    """Return closed rounds of edges as ordered points; one edge must leave each point."""
     following = dict(edges.tolist())
     closed = []
     while following:
@@ -375,10 +375,10 @@ class Content:
         return [0, *np.cumsum([len(corners) for _, corners in self.cells]).tolist()]
 
 
-def places(tags: np.ndarray, wanted: list[np.ndarray]) -> list[np.ndarray]:
-    """Return where the wanted tags are; refused where one is missing or two are equal."""
+def find_tags(tags: np.ndarray, requested: list[np.ndarray]) -> list[np.ndarray]:
+    """Return the place of each requested tag among `tags`; refuse missing and repeated tags."""
     order = np.argsort(tags, kind="stable")
-    ordered, flat = tags[order], np.concatenate([np.zeros(0, dtype=np.int64), *(one.ravel() for one in wanted)])
+    ordered, flat = tags[order], np.concatenate([np.zeros(0, dtype=np.int64), *(one.ravel() for one in requested)])
     twice = ordered[1:][ordered[1:] == ordered[:-1]]
     if len(twice):
         raise MeshError(f"points have one number twice: {twice[0]}; renumber them")
@@ -386,5 +386,5 @@ def places(tags: np.ndarray, wanted: list[np.ndarray]) -> list[np.ndarray]:
     missing = np.append(ordered, -1)[at] != flat
     if missing.any():
         raise MeshError(f"a cell has point {flat[missing][0]}, which the file does not have; write all points")
-    parts = np.split(order[at], np.cumsum([one.size for one in wanted[:-1]]))
-    return [part.reshape(one.shape) for part, one in zip(parts, wanted)]
+    parts = np.split(order[at], np.cumsum([one.size for one in requested[:-1]]))
+    return [part.reshape(one.shape) for part, one in zip(parts, requested)]

@@ -12,7 +12,7 @@ import numpy as np
 MOST_PAIRS = 4_000_000  # pairs of edges that are compared at a time
 
 
-def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.ndarray:
+def near_edges(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Return pairs (n_pairs, 2) of disjoint edges nearer than their reaches (n,) together [m]."""
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     # Along a direction in which few sides of shapes run, an edge overlaps few others.
@@ -34,7 +34,7 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.ndarr
         one, other = one[near], other[near]
         a, b, c, d = start[one], end[one], start[other], end[other]
         crossing = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
-        distance = np.min([away(a, c, d), away(b, c, d), away(c, a, b), away(d, a, b)], axis=0)
+        distance = np.min([distances(a, c, d), distances(b, c, d), distances(c, a, b), distances(d, a, b)], axis=0)
         close = crossing | (distance <= reach[one] + reach[other])
         found.append(np.stack([one, other], axis=1)[close])
         begin = stop
@@ -47,7 +47,7 @@ def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     return np.asarray(way[..., 0] * there[..., 1] - way[..., 1] * there[..., 0])
 
 
-def away(point: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+def distances(point: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
     """Distance of points from edges from `one` to `two`, all (n, 2) [m]."""
     along = two - one
     share = np.clip(((point - one) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
@@ -182,7 +182,7 @@ class OutlineSide:
         centre = self.centre[0] - origin[0], self.centre[1] - origin[1]
         return 0.5 * (centre[0] * (v - y) - centre[1] * (u - x) + across * along * turn)
 
-    def aside(self, low: float, high: float) -> float:
+    def chord_distance(self, low: float, high: float) -> float:
         """Bound on the distance of points between two parameters from the chord between these [m]."""
         if self.arc is None:
             return 0.0
@@ -217,7 +217,7 @@ class OutlineSide:
         parameter = min((0.0, 1.0, 0.5 * (low + high)), key=lambda one: math.dist(self.at(one), point))
         return parameter, math.dist(self.at(parameter), point)
 
-    def find_on_it(self, points: Mapping[str, Point], small: float) -> dict[str, float]:
+    def find_points(self, points: Mapping[str, Point], small: float) -> dict[str, float]:
         """Return parameters of the named points within a distance `small` [m]; 0 or 1 near an end."""
         found = {}
         for name, point in points.items():
@@ -311,7 +311,7 @@ def find_meeting(rounds: Sequence[tuple[OutlineSide, ...]]) -> tuple[tuple[int, 
         errors = [0.0 if side.arc is None else CHORD_ERROR * math.dist(*extent(sides)) for side in sides]
         reaches.append(LEAST_SIDE_GAP * size + np.array(errors)[numbers])
     places, ends = np.concatenate(points), np.concatenate(edges)
-    pairs = np.sort(nearer(places, ends, np.concatenate(reaches)), axis=1)  # edges are numbered as their sides are
+    pairs = np.sort(near_edges(places, ends, np.concatenate(reaches)), axis=1)  # edges are numbered as their sides are
     if not len(pairs):
         return None
     one, other = min(pairs.tolist())

@@ -20,7 +20,7 @@ from ..problem.shapes import Beam, Shape
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
-from ..scene.mesh_cache import MeshCache, is_a
+from ..scene.mesh_cache import MeshCache, check_type
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
@@ -129,7 +129,7 @@ class Choice(Tabled):
         yield "besides springs", self.extra
 
     def _missing(self, part: str) -> str:
-        """Word for a missing number."""
+        """Word that stands for a missing number."""
         if "springs" in self.failures:
             return "refused"
         others = (why for name, why in self.failures.items() if name not in self.errors)
@@ -152,7 +152,7 @@ def number_text(value: float, form: Callable[[float], str], missing: str) -> str
 
 def check_beam(beam: Beam) -> None:
     """Refuse a beam of absurd size, or too slender for its references."""
-    is_a(beam, Beam, "beam")
+    check_type(beam, Beam, "beam")
     for word, side in {"long": beam.length, "high": beam.height, "thick": beam.thickness}.items():
         if not SHORTEST_SIDE <= side <= LONGEST_SIDE:
             remedy = f"give {1e3 * SHORTEST_SIDE:g} to {1e3 * LONGEST_SIDE:g} mm, or correct its unit"
@@ -163,20 +163,20 @@ def check_beam(beam: Beam) -> None:
         raise ValueError(f"beam {beam.name!r}: {why}; such shapes are for beam theory")
 
 
-def predicted() -> tuple[str, ...]:
-    """Loads that can be predicted: all but those that turn, which linear kinematics do not tell from others."""
+def predictable_loads() -> tuple[str, ...]:
+    """Loads that can be predicted: not followers, which do not differ from other loads in linear kinematics."""
     return tuple(name for name, load in LOADS.items() if not load.follower)
 
 
 def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
-    """Loads, each once."""
-    return check_names("loads", loads, predicted(), USUAL_LOADS, "cannot be predicted")
+    """Return the names of loads, each once; refuse those that cannot be predicted."""
+    return check_names("loads", loads, predictable_loads(), USUAL_LOADS, "cannot be predicted")
 
 
 def check_names(
     what: str, given: Iterable[str], known: Collection[str], examples: Sequence[str], wrong: str
 ) -> tuple[str, ...]:
-    """Names of loads or mesh types, each once, all of them `known`."""
+    """Return names, such as of loads, each once; refuse those that are not `known`."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise ValueError(f"{what}: {given!r} is no list of {what}; give one such as {list(examples)}")
     names = tuple(given)
@@ -189,7 +189,7 @@ def check_names(
 
 
 def references(beam: Beam, material: Material, loads: Iterable[str] = USUAL_LOADS) -> References:
-    """References of loads."""
+    """References of a beam by load, for 1 N."""
     check_beam(beam)
     return {load: reference_of(beam, material, load) for load in check_loads(loads)}
 
@@ -286,7 +286,7 @@ def trial(
     load: str | None = None,
     also: Iterable[str] = (),
 ) -> "Trial":
-    """Definitions to solve on a mesh, with the arguments of `predict`."""
+    """Return a `Trial` of the definitions on a mesh; the arguments are those of `predict`."""
     more = [choose(DEFINITIONS, name, "also").name for name in also]
     if isinstance(beam, Shape):
         problem = ShapeProblem(beam, mesh, material, only_load(beam, load), 1.0, "linear")
@@ -302,18 +302,18 @@ def trial(
 def beam_problems(
     beam: Beam, mesh: Mesh | GroupedMesh, material: AnyMaterial | Mapping[str, AnyMaterial], loads: Iterable[str]
 ) -> list[BeamProblem]:
-    """Statements of 1 N in linear kinematics, one for each load."""
+    """Boundary-value problems of 1 N in linear kinematics, one for each load."""
     first, *others = check_loads(loads)
     one = BeamProblem(beam, mesh, material, first, 1.0, "linear")
     return [one, *(BeamProblem(beam, mesh, material, load, 1.0, "linear", one.cache) for load in others)]
 
 
-def as_sure_as(known: Mapping[str, Any]) -> float:
-    """Difference up to which errors against some references are equal [1]."""
+def error_margin(known: Mapping[str, Any]) -> float:
+    """Largest difference of two errors that counts as none [1]: the error estimate of the references."""
     return max([one.error_estimate for one in known.values() if not isinstance(one, str)] + [ROUNDING_ERROR])
 
 
-def in_order(
+def sort_by_error(
     those: Iterable[_T], worst: Callable[[_T], float], tie: Callable[[_T], tuple[Any, ...]], equal: float
 ) -> list[_T]:
     """Sort by an error, and by `tie` those whose errors are above the least of them by no more than `equal`."""
@@ -337,7 +337,7 @@ def only_load(shape: Shape, load: str | None) -> str:
 
 
 def shape_references(problem: ShapeProblem) -> References:
-    """References of the quantities of a load case, each found or missing by itself."""
+    """Return the references of a load case by quantity; instead of a missing one the reason."""
     from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
     case, as_read = problem.case, problem.grouped if problem.shape.file else None
@@ -362,8 +362,8 @@ def errors_under(problem: BoundaryProblem, springs: Springs, known: References) 
     if found.status is not Status.SOLVED:
         return dict.fromkeys(labels, found.message)
     values = {problem.load: found.displacement} | problem.values(springs, found)
-    wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
-    return dict(quantity_errors({name: values[name] for name in labels}, wanted))
+    target = {name: one.value for name, one in known.items() if not isinstance(one, str)}
+    return dict(quantity_errors({name: values[name] for name in labels}, target))
 
 
 class Trial:
@@ -434,10 +434,10 @@ class Trial:
         return name
 
     def choices(self, without: Collection[str] = ()) -> TabledList[Choice]:
-        """Best choices of all but the definitions `without`, see `in_order`."""
+        """Best choices, see `sort_by_error`; the definitions `without` are left out."""
         names = [name for name in self.names if name not in without]
-        measured, equal = {name: one for name in names if (one := self.measured(name))}, as_sure_as(self.known)
-        order = in_order(measured, lambda name: measured[name][1], lambda name: (measured[name][0], name), equal)
+        measured, equal = {name: one for name in names if (one := self.measured(name))}, error_margin(self.known)
+        order = sort_by_error(measured, lambda name: measured[name][1], lambda name: (measured[name][0], name), equal)
         best = order[:MOST_CHOICES] + [name for name in order if not measured[name][0]][:MOST_CHOICES]
         found = [self.choice(name) for name in order if name in best or name in self._also]
         # The patch test is for the best ones alone, and may find one of them unstable.
@@ -452,7 +452,7 @@ class Trial:
         return tuple(name for name in self.names if name in self.same or "patch test" in self.failures.get(name, ()))
 
     def measured(self, name: str) -> tuple[bool, float] | None:
-        """Whether a definition has energies, and its worst error; None where it has no springs of its own."""
+        """Return whether a definition has energies, and its worst error; None if it has no springs of its own."""
         springs = self.springs(name)
         if springs is None:
             return None if "springs" in self.failures[name] and name not in self._also else (False, inf)
@@ -471,10 +471,10 @@ class Trial:
             failures = {self.problems[0].load: next(iter(failures.values()))}
         young = poisson = nan
         if self._test is not None:
-            wanted = cast(Material, self.materials[0]).in_plane.young_modulus * self.thickness
+            target = cast(Material, self.materials[0]).in_plane.young_modulus * self.thickness
             try:
                 modulus, poisson = self._test.axial(springs)
-                young = modulus * springs.reference / wanted - 1
+                young = modulus * springs.reference / target - 1
             except SingularError as error:
                 failures["patch test"] = f"unstable: {error}"
         errors = {label: nan if isinstance(error, str) else error for label, error in found.items()}
@@ -490,7 +490,7 @@ class Trial:
         return nan if isinstance(steps, str) else float(steps["central-difference"])
 
 
-IN_WORDS = (
+ENERGY_WORDS = (
     (AngleEnergy, "springs at the corners of each triangle"),
     (BiquadraticEnergy, "coupling of the sides of each triangle"),
     (Energy, "a law of each triangle"),
@@ -502,20 +502,20 @@ def in_words(cache: MeshCache, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = cache.mesh
     stiffness = springs.reference * springs.relative
-    inside, at_outline, diagonals = (_common_value(stiffness[part]) for part in places(mesh).values())
+    inside, at_outline, diagonals = (_common_value(stiffness[part]) for part in edge_places(mesh).values())
     extra = []
     for energy in springs.energies:
         if isinstance(energy, AreaEnergy):
             modulus = _common_value(springs.reference * energy.modulus) / cache.thickness
             extra.append(f"area energy, K_A = {1e-6 * modulus:.4g} MPa")
         else:
-            extra.append(next(words for kind, words in IN_WORDS if isinstance(energy, kind)))
+            extra.append(next(words for kind, words in ENERGY_WORDS if isinstance(energy, kind)))
     if len(mesh.quads):
         extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
     return inside, at_outline, "; ".join(extra) or "none"
 
 
-def places(mesh: Mesh) -> dict[str, np.ndarray]:
+def edge_places(mesh: Mesh) -> dict[str, np.ndarray]:
     """Which edges of a mesh are inside, on the outline, or diagonals of its cells, in words."""
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1
     return {"inside": several, "on the outline": outline, "on diagonals": ~outline & ~several}

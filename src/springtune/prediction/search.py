@@ -17,13 +17,13 @@ from ..mesh.rows import ROW_HEIGHT
 from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import quantity, whole
+from ..problem.quantities import quantity, whole_number
 from ..problem.shapes import Beam, Shape
 from ..safe_io import Tabled, mesh_size_text, number_of
 from ..scene.boundary_problem import BoundaryProblem, ShapeProblem
-from ..scene.mesh_cache import is_a
+from ..scene.mesh_cache import check_type
 from . import choices
-from .choices import SEARCHED_PARTICLES, USUAL_LOADS, Choice, References, Trial, as_sure_as, in_order
+from .choices import SEARCHED_PARTICLES, USUAL_LOADS, Choice, References, Trial, error_margin, sort_by_error
 
 logger = logging.getLogger(__name__)
 
@@ -212,7 +212,7 @@ class MeshSearch(Tabled):
         ranked = sorted(filter(None, found.values()), key=rank)
         alike = [one for one in ranked if rank(one) == rank(ranked[0])]
         tie = attrgetter("choice.energies", "choice.definition", "mesh_type")
-        return next(iter(in_order(alike, attrgetter("choice.worst"), tie, as_sure_as(self.known))), None)
+        return next(iter(sort_by_error(alike, attrgetter("choice.worst"), tie, error_margin(self.known))), None)
 
 
 def asked_error(value: float | str, name: str = "error") -> float:
@@ -282,8 +282,8 @@ def find_mesh(
     >>> print(f"at worst {100 * best.choice.worst:.1f} %, steps up to {1e9 * best.step_limit:.0f} ns")
     at worst 1.0 %, steps up to 1515 ns
     """
-    wanted = asked_error(error)
-    whole(most, "most")
+    target = asked_error(error)
+    whole_number(most, "most")
     if isinstance(beam, Shape):
         if loads is not USUAL_LOADS or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
@@ -294,7 +294,7 @@ def find_mesh(
     elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     else:
-        material = is_a(material, Material, "material")
+        material = check_type(material, Material, "material")
         given = MESH_TYPES if mesh_types is None else mesh_types
         names = choices.check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
         known = choices.references(beam, material, loads)
@@ -305,13 +305,13 @@ def find_mesh(
             why = one if isinstance(one, str) else "it is zero"
             raise ValueError(f"{what}: {name!r} has no reference, so no error of it can be kept: {why}{remedy}")
     estimates = {name: one.error_estimate for name, one in known.items() if not isinstance(one, str)}
-    if wanted <= max(estimates.values()):
+    if target <= max(estimates.values()):
         least = f"{200 * max(estimates.values()):.1g} %"
         raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")
-    searches = [_Search(family, known, estimates, wanted, most) for family in families]
-    found, alone = ({one.family.name: one.find(only) for one in searches} for only in (False, True))
+    searches = [_Search(family, known, estimates, target, most) for family in families]
+    found, of_springs = ({one.family.name: one.find(only) for one in searches} for only in (False, True))
     solved = tuple(one for search in searches for one in search.solved)
-    return MeshSearch(wanted, tuple(known), most, known, found, alone, solved)
+    return MeshSearch(target, tuple(known), most, known, found, of_springs, solved)
 
 
 @dataclass(frozen=True)
@@ -377,7 +377,7 @@ class _Search:
 
     @property
     def solved(self) -> list[SolvedMesh]:
-        """All that was solved, from coarse to fine."""
+        """Meshes that were solved, from coarse to fine."""
         return sorted(self._meshes.values(), key=attrgetter("cells"))
 
     def find(self, springs_alone: bool) -> MeshChoice | None:
@@ -418,7 +418,7 @@ class _Search:
         return min(starts.items()) if starts else None  # no two have the same cells
 
     def _size(self, cells: float) -> float:
-        """Mesh size [m] of so many cells across the smaller side, rounded up."""
+        """Mesh size [m] that gives a number of cells across the smaller side, rounded up."""
         exact = self.family.one_cell / cells * 1e3
         digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
         # By its text, as the option of a command has it; what is a hair above a digit is that digit.
@@ -454,7 +454,7 @@ class _Search:
     def _choice(self, cells: int, names: list[str], springs_alone: bool) -> MeshChoice:
         """The best of some definitions on a mesh."""
         one = self._meshes[self._keys[cells]]
-        name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
+        name = sort_by_error(names, one.worst, lambda name: (name in one.energies, name), error_margin(self.known))[0]
         tried = Trial(self.family.problems(one.size), self.known, [name])
         choice = replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone)))
         finer = tuple(each for each in self.solved if each.cells > cells and name in each.errors)

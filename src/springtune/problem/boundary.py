@@ -32,22 +32,22 @@ def box(mesh: Mesh, kind: LoadKind) -> GroupedMesh:
     return GroupedMesh(mesh, edges, {MIDDLE: middle} if kind.pressed else {})
 
 
-def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
+def held_directions(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return the directions that a kind of load holds, see `springtune.problem.loads`."""
-    return supported(box(mesh, kind), kind.case)[0]
+    return support_directions(box(mesh, kind), kind.case)[0]
 
 
 def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return each particle's weight in an even load over the loaded side: sum 1 along the force, zero across."""
-    return even(box(mesh, kind), kind.loaded.name, kind.axis)
+    return even_weights(box(mesh, kind), kind.loaded.name, kind.axis)
 
 
-def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
+def measured_weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return the weights of a load's displacement, sum 1: the loaded side's mean, or under pressure its middle."""
     return displacement_weights(box(mesh, kind), kind.case.quantities[0])
 
 
-def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
+def support_directions(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
     """Return the directions that a load case holds and their prescribed displacements [m], zero elsewhere."""
     points = grouped.mesh.points
     held, given = np.zeros(points.shape, dtype=bool), np.zeros(points.shape)
@@ -68,7 +68,7 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
     return held, given
 
 
-def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
+def even_weights(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
     """Return the weights of an even distribution over a group, by length; sum 1 along `axis`, zero across."""
     field = np.zeros(grouped.mesh.points.shape)
     field[:, axis] = _lengths(grouped, group)
@@ -87,7 +87,7 @@ def forces(
     for traction in case.tractions:
         for axis, force in enumerate(traction.force):
             if force:
-                field += force * even(grouped, traction.group, axis)
+                field += force * even_weights(grouped, traction.group, axis)
     for pressure in case.pressures:
         if followers or not pressure.follower:
             edges = grouped.sides[pressure.group]
@@ -99,7 +99,7 @@ def forces(
     return field
 
 
-def followed(grouped: GroupedMesh, case: LoadCase, thickness: float) -> tuple[np.ndarray, np.ndarray]:
+def follower_edges(grouped: GroupedMesh, case: LoadCase, thickness: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the edges (n, 2) with follower pressure, the body to the left, and it (n,) times the thickness [N/m]."""
     found = [(grouped.sides[one.group], one.pressure * thickness) for one in case.pressures if one.follower]
     edges, pressures = zip((no_cells(2), 0.0), *found)
@@ -128,7 +128,7 @@ def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray
     """Return the weights, sum 1, of a displacement quantity: the mean of sides, or a point's."""
     axis = "xy".index(quantity.component)
     if quantity.of in grouped.sides:
-        return even(grouped, quantity.of, axis)
+        return even_weights(grouped, quantity.of, axis)
     count, cell, shares = cell_at(grouped, quantity.of)
     field = np.zeros(grouped.mesh.points.shape)
     field[grouped.mesh.cells[count][cell], axis] = shares
@@ -218,7 +218,7 @@ def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
     for quantity in case.quantities:
         if quantity.of in grouped.points and not _in_body(grouped, quantity.of):
             raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
-    check_held(grouped.mesh.points, grouped.mesh.edges, supported(grouped, case)[0], where)
+    check_held(grouped.mesh.points, grouped.mesh.edges, support_directions(grouped, case)[0], where)
 
 
 def _in_body(grouped: GroupedMesh, name: str) -> bool:

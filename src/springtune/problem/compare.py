@@ -122,8 +122,8 @@ def _last_root(solve: Solve, reference: float, softness: float, unsolved: float,
     return None
 
 
-def assured(errors: np.ndarray) -> np.ndarray:
-    """Largest error of each mesh size and all finer ones that were run: a chance crossing of zero promises nothing.
+def largest_finer_errors(errors: np.ndarray) -> np.ndarray:
+    """Largest error of each mesh size and all finer ones that were run, since errors may cross zero by chance.
 
     Arrays are (n_approaches, n_sizes), finest size first. NaN there, and from where a finer one failed.
     """

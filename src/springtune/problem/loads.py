@@ -42,7 +42,7 @@ class Side:
 
     @property
     def name(self) -> str:
-        """Its name as a group."""
+        """Name of the side as a group."""
         return (("left", "right"), ("bottom", "top"))[self.axis][self.far]
 
     def place(self, length: float, height: float) -> float:
@@ -52,7 +52,7 @@ class Side:
 
 LEFT, RIGHT, BOTTOM, TOP = Side(0, False), Side(0, True), Side(1, False), Side(1, True)
 
-BOTH = (0, 1)  # directions that a clamp holds
+AXES = (0, 1)  # directions that a clamp holds
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class LoadKind:
     pressed: bool = False
 
     def __str__(self) -> str:
-        """The name."""
+        """Return the name."""
         return self.name
 
     @property
@@ -95,7 +95,7 @@ class LoadKind:
     @property
     def clamped(self) -> bool:
         """Whether the side opposite to the loaded one is clamped and nothing else is held."""
-        return self.held == ((Side(self.normal, not self.loaded.far), BOTH),)
+        return self.held == ((Side(self.normal, not self.loaded.far), AXES),)
 
     @property
     def mirrored(self) -> bool:
@@ -132,10 +132,10 @@ class LoadKind:
         return (beam.length, beam.height)[self.along]
 
 
-AXIAL = LoadKind("axial", loaded=RIGHT, axis=0, held=((LEFT, BOTH),))
-BENDING = LoadKind("bending", loaded=RIGHT, axis=1, held=((LEFT, BOTH),))
-SHEAR = LoadKind("shear", loaded=TOP, axis=0, held=((BOTTOM, BOTH), (TOP, (1,))))
-FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, BOTH),), pressed=True)
+AXIAL = LoadKind("axial", loaded=RIGHT, axis=0, held=((LEFT, AXES),))
+BENDING = LoadKind("bending", loaded=RIGHT, axis=1, held=((LEFT, AXES),))
+SHEAR = LoadKind("shear", loaded=TOP, axis=0, held=((BOTTOM, AXES), (TOP, (1,))))
+FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, AXES),), pressed=True)
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ LOAD_KINDS = _Kinds({load.kind.name: load.kind for load in OWN_LOADS.values()}) 
 
 
 def _check_load(name: str, load: Any) -> Load:
-    """Load of another package; what its kind holds is in the kind's name, and so in the keys of results."""
+    """Check a load of another package, and put a hash into its kind's name: keys of results then depend on the kind."""
     if not NAME.fullmatch(name):
         raise ValueError(f"it cannot name a load; {NAME_RULE}")
     if type(load) is not Load or type(load.kind) is not LoadKind:

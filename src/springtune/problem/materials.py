@@ -27,9 +27,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..safe_io import csv_rows, numbers
-from .quantities import PLANES, Number, choose, positive, put, quantity, whole
+from .quantities import PLANES, Number, choose, positive, put, quantity, whole_number
 
-INCOMPRESSIBLE = (
+INCOMPRESSIBLE_REASON = (
     "0.5: in plane strain an incompressible material has no finite stiffness; give a ratio below 0.5 such as 0.49, or "
     "plane 'stress'"
 )
@@ -92,7 +92,7 @@ class Material:
             given = f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}"
             raise ValueError(f"{given}: isotropic materials have -1 < nu <= 0.5; give a number in that range")
         if self.plane == "strain" and self.poisson_ratio == 0.5:
-            raise ValueError(f"Poisson's ratio of {self.name!r} is {INCOMPRESSIBLE}")
+            raise ValueError(f"Poisson's ratio of {self.name!r} is {INCOMPRESSIBLE_REASON}")
 
     @property
     def in_plane(self) -> Material:
@@ -122,7 +122,7 @@ class InPlane(Material):
 
     @property
     def in_plane(self) -> Material:
-        """The same."""
+        """The object itself: its constants are those in its plane."""
         return self
 
 
@@ -309,7 +309,7 @@ class AnisotropicMaterial:
         for constant in CONSTANTS:
             read = positive if constant in ("C11", "C22", "C66") else quantity
             put(self, **{constant: read(getattr(self, constant), "stress", constant)})
-        if fault := indefinite(*(getattr(self, constant) for constant in CONSTANTS)):
+        if fault := indefinite_reason(*(getattr(self, constant) for constant in CONSTANTS)):
             raise ValueError(f"material {self.name!r}: {fault}")
 
     @classmethod
@@ -412,12 +412,12 @@ class AnisotropicMaterial:
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
             if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], AnyMaterial)):
-                raise ValueError(f"ply {number}: {ply!r} is none; give a material, an angle and a thickness")
+                raise ValueError(f"ply {number}: {ply!r} is not a ply; give a material, an angle and a thickness")
             material, angle, thickness = ply
             turned = rotated(material.plane_stress, quantity(angle, "angle", f"angle of ply {number}"))
             parts.append((material, turned, positive(thickness, "length", f"thickness of ply {number}")))
         if not parts:
-            raise ValueError("plies: there are none; give at least one material, angle and thickness")
+            raise ValueError("plies: empty; give at least one material, angle and thickness")
         total = math.fsum(part for _, _, part in parts)
         densities = [material.density for material, _, _ in parts]
         if density is None and None not in densities:
@@ -533,7 +533,7 @@ def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
     return 0.5 * (turned + turned.T)
 
 
-def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0, c26: float = 0.0) -> str:
+def indefinite_reason(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0, c26: float = 0.0) -> str:
     """Return why constants in plane stress [Pa] are not positive definite, with the bound, or an empty string."""
     bound = math.sqrt(c11) * math.sqrt(c22)
     why = "or some strain takes no work; correct"
@@ -556,11 +556,11 @@ def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
     return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
 
 
-def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str, AnyMaterial]:
+def materials_by_part(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str, AnyMaterial]:
     """Return the material of each part of a body; parts without one of their own have that of the main part, ``""``.
 
     >>> steel, foam = Material("210 GPa", 0.3, name="steel"), Material("1 MPa", 0.3, name="foam")
-    >>> {part: one.name for part, one in of_parts({"": steel, "core": foam}, ["core", "rim"]).items()}
+    >>> {part: one.name for part, one in materials_by_part({"": steel, "core": foam}, ["core", "rim"]).items()}
     {'core': 'foam', 'rim': 'steel'}
     """
     if len(parts) > 1 and not any(given):
@@ -574,7 +574,7 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     return {part: given[part if part in given else ""] for part in parts}
 
 
-def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
+def check_isotropic(material: AnyMaterial, remedy: str) -> Material:
     """Return an isotropic material; raise ValueError with the remedy for any other."""
     if not isinstance(material, Material):
         raise ValueError(f"material: {material.name!r} is anisotropic, and beams are of isotropic ones; {remedy}")
@@ -608,7 +608,7 @@ _RATIOS = dict.fromkeys(("-", "1", "m/m", "mm/mm"), 1.0) | {"%": 1e-2}  # size o
 
 
 class TestDataError(ValueError):
-    """A test to which no law can be fitted; the message gives the reason and the remedy."""
+    """No law can be fitted to a test; the message gives the reason and the remedy."""
 
     __test__ = False  # to pytest
 
@@ -748,7 +748,7 @@ def fit_rubber(
     solved: 108 mm
     """
     test = read_test(uniaxial)
-    whole(terms, "terms", MOST_TERMS)
+    whole_number(terms, "terms", MOST_TERMS)
     stretch, excess = test.stretch, Rubber.excess("uniaxial", test.stretch)
     slopes = [n * excess ** (n - 1) for n in range(1, terms + 1)]  # of a coefficient of 1 Pa
     found = fit(np.stack([2 * (stretch - stretch**-2) * slope for slope in slopes], axis=1), test)

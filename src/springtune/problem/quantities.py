@@ -35,12 +35,12 @@ def positive(value: float | str, kind: str, name: str) -> float:
     number = quantity(value, kind, name)
     if not number > 0:
         raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")
-    if beyond(number, kind):
-        raise ValueError(f"{name}: {value!r} is beyond all measure; {_remedy(kind)}")
+    if out_of_range(number, kind):
+        raise ValueError(f"{name}: {value!r} is far out of range; {_remedy(kind)}")
     return number
 
 
-def whole(value: Any, name: str, most: float = math.inf) -> int:
+def whole_number(value: Any, name: str, most: float = math.inf) -> int:
     """Return a whole number above zero, up to the most that is run."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
         raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
@@ -59,7 +59,7 @@ LEAST_QUANTITY, MOST_QUANTITY = 1e-40, 1e40
 """Quantities between which products of several stay numbers [SI units]; forces are what they are."""
 
 
-def beyond(number: Number, kind: str) -> bool:
+def out_of_range(number: Number, kind: str) -> bool:
     """Whether a quantity is so small or large that nothing can be computed with it."""
     return bool(kind != "force" and not LEAST_QUANTITY <= number <= MOST_QUANTITY)
 
@@ -102,7 +102,7 @@ SWEPT = {
 
 PLANES = "stress", "strain"  # plane stress and plane strain: the quantity that is zero across a sheet
 
-OF_BODIES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name in ("young_modulus", "poisson_ratio")}
+BODY_NAMES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name in ("young_modulus", "poisson_ratio")}
 """Variable of a dataset that holds a parameter of beams or materials."""
 
 MOST_SCENES = 1_000_000

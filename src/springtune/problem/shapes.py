@@ -102,7 +102,7 @@ def beam_label(name: str, length: float, height: float) -> str:
 
 
 def size_text(length: float, height: float) -> str:
-    """Return extents [m] in words.
+    """Return extents [m] as text, such as ``80 x 30 mm``.
 
     >>> size_text(0.08, 0.06), size_text(80, 60), size_text(8e-5, 1e-6)
     ('80 x 60 mm', '80 x 60 m', '80 x 1 um')
@@ -119,7 +119,7 @@ SIDE_TOLERANCE = 1e-6
 
 
 def _vector(value: Any, kind: str, name: str, example: str) -> tuple[float, float]:
-    """Components of a vector of a kind of quantity."""
+    """Return both components of a quantity in SI units; refuse what is no pair."""
     if isinstance(value, str) or not (hasattr(value, "__len__") and len(value) == 2):
         raise ValueError(f"{name}: {value!r} is not x and y; give two such as {example}")
     x, y = value
@@ -127,7 +127,7 @@ def _vector(value: Any, kind: str, name: str, example: str) -> tuple[float, floa
 
 
 def _place(value: Any, name: str) -> Point:
-    """Coordinates of a point."""
+    """Return the coordinates of a point in m; refuse what is no point."""
     return _vector(value, "length", name, "('20 mm', '5 mm')")
 
 
@@ -137,12 +137,12 @@ def _check_name(value: object, what: str, *, empty: bool = False) -> None:
         raise ValueError(f"{what}: {value!r} cannot be a name; {NAME_RULE}")
 
 
-def _tuple_of(values: Any, wanted: type, name: str) -> tuple[Any, ...]:
-    """Tuple of values of a type."""
+def _tuple_of(values: Any, expected: type, name: str) -> tuple[Any, ...]:
+    """Return a value, or several, as a tuple; refuse other types."""
     found = tuple(values) if isinstance(values, Iterable) else (values,)
     for one in found:
-        if not isinstance(one, wanted):
-            raise ValueError(f"{name}: {one!r} is not a {wanted.__name__}; give springtune.{wanted.__name__}(...)")
+        if not isinstance(one, expected):
+            raise ValueError(f"{name}: {one!r} is not a {expected.__name__}; give springtune.{expected.__name__}(...)")
     return found
 
 
@@ -677,7 +677,7 @@ class Shape:
         for other, place in self.points.items():
             if 0 < math.dist(point, place) <= near:
                 both = f"points {name!r} and {other!r}"
-                raise ValueError(f"{both}: are as good as one at {in_words(point)}; make them one")
+                raise ValueError(f"{both}: coincide at {in_words(point)}; make them one")
         return point
 
     @cached_property

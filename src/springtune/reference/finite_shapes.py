@@ -116,7 +116,7 @@ class _FiniteLevel(Level, Body):
         moved = self._continued()
         if moved is None:
             try:
-                moved, _ = self.moved(1.0, f"shape {problem.shape.name!r}, load {problem.load.name!r}")
+                moved, _ = self.equilibrium_under(1.0, f"shape {problem.shape.name!r}, load {problem.load.name!r}")
             except FiniteStrainError as error:
                 raise FiniteStrainError(f"{error}{self._where_it_gives_way()}") from None
         gradient = self._gradient(moved)
@@ -140,7 +140,7 @@ class _FiniteLevel(Level, Body):
         return f" {degrees}, {pressed}: {why}. Round that corner, hold it less or load it less"
 
     def _continued(self) -> np.ndarray | None:
-        """Equilibrium that Newton's method finds from that of the last level, if it is stable."""
+        """Find the equilibrium by Newton's method from the last level's; None if it is not stable."""
         space, last = self.space, self.levels.last
         if last is None:
             return None
@@ -154,8 +154,8 @@ class _FiniteLevel(Level, Body):
         """Linear solution under the whole load."""
         return Level._solve(self, self.load, self.held, self.given)[0]
 
-    def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
-        """Relative size of the last step."""
+    def _last_change(self, step: np.ndarray, moved: np.ndarray) -> float:
+        """Largest change of a displacement in the last step, over the largest displacement [1]."""
         return float(np.abs(step).max() / np.abs(moved).max())
 
     def _turning(self) -> csr_array:

@@ -111,8 +111,8 @@ class Body:
     turning: csr_array
     extent: float
 
-    def moved(self, stress: float, name: str, watched: bool = True) -> tuple[np.ndarray, float]:
-        """Return the equilibrium under so many times the load, in watched steps, and its relative rounding error."""
+    def equilibrium_under(self, stress: float, name: str, watched: bool = True) -> tuple[np.ndarray, float]:
+        """Return the equilibrium under `stress` times the load, reached in steps, and its relative rounding error."""
         path, step = [(0.0, np.zeros(self.load.shape))], 1.0
         while path[-1][0] < 1:
             done = path[-1][0]
@@ -201,7 +201,7 @@ class Body:
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
             if np.abs(step).max() <= TOLERANCE * np.abs(moved).max():
-                return moved, self._open(step, moved), self._is_stable_by_factor(factor, moved, stress)
+                return moved, self._last_change(step, moved), self._is_stable_by_factor(factor, moved, stress)
         return None
 
     def _gradient(self, moved: np.ndarray) -> np.ndarray:
@@ -209,7 +209,7 @@ class Body:
         return np.swapaxes(self.gradients @ moved[self.nodes_of][:, None], 2, 3)
 
     def _forces(self, gradient: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        """Inner forces of second Piola-Kirchhoff stresses xx, yy, xy."""
+        """Internal forces of second Piola-Kirchhoff stresses xx, yy, xy."""
         first = (gradient + np.eye(2)) @ matrix_of(stress) * self.weights[..., None, None]
         count, points = self.weights.shape
         forces = np.swapaxes(self.gradients, 2, 3).transpose(0, 2, 1, 3).reshape(count, -1, 2 * points)
@@ -219,7 +219,7 @@ class Body:
         return total
 
     def _tangent(self, gradient: np.ndarray, state: "Response") -> csr_array:
-        """Derivative of the inner forces."""
+        """Derivative of the internal forces by displacements."""
         count, points, _, shapes = self.gradients.shape
         deformation, by_x, by_y = gradient + np.eye(2), self.gradients[:, :, 0], self.gradients[:, :, 1]
         # Changes of strains xx, yy and 2 xy with each unknown.
@@ -244,8 +244,8 @@ class Body:
         """Rows and columns of the entries of all elements' matrices."""
         return entry_places(2 * self.nodes_of[:, :, None] + np.arange(2))
 
-    def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
-        """Relative change of the load's displacement by the last step."""
+    def _last_change(self, step: np.ndarray, moved: np.ndarray) -> float:
+        """Change of the load's displacement in the last step, relative [1]."""
         return float(abs((self.load * step).sum() / (self.load * moved).sum()))
 
 
@@ -282,7 +282,7 @@ class _Sheet(Body):
 
     def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
         """Equilibrium under the whole load, reached in watched steps; lengths are over half the height."""
-        moved, uncertain = self.moved(stress, name, watched)
+        moved, uncertain = self.equilibrium_under(stress, name, watched)
         mean = float((self.load * moved).sum() / self.load.sum())
         kind, (x, y, field) = self.kind, self._field(moved)
         places = (x, y)[kind.along]
@@ -292,7 +292,7 @@ class _Sheet(Body):
         return FiniteStrainSolution(displacement, mean, uncertain, x, y, field, positions, profile)
 
     def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
+        """Return coordinates of a grid over the whole sheet, from 0 on, and displacements at its nodes."""
         x, y = self.axes
         field = np.empty((len(x), len(y), 2))
         at = self.nodes_at.T
@@ -353,7 +353,7 @@ def _element_ends(length: float, count: int, kind: LoadKind) -> tuple[np.ndarray
 
 
 def _graded_coordinates(near: np.ndarray, length: float, count: int, most: float = np.inf) -> np.ndarray:
-    """Coordinates from 0 to length, graded within 1 of 0 and even beyond, there of so many elements at most."""
+    """Coordinates from 0 to length, graded within 1 of 0 and even beyond, there with at most `most` elements."""
     if length <= 1:
         return near * length
     columns = int(min(max(1, round(count * (length - 1) / 2)), most * count))

@@ -102,7 +102,7 @@ class Interpolant:
         return Answers(np.exp(found[0]), np.exp(found[1]), np.expm1(found[2]) * strain, strain, self.error_estimate)
 
     def arrays(self) -> dict[str, Any]:
-        """Numbers and arrays that `from_arrays` takes, such as a file holds."""
+        """Return numbers and arrays to store, from which `from_arrays` makes the interpolant again."""
         ranges = {name: np.array(getattr(self, name)) for name in ("aspect_range", "nu_range")}
         return vars(self) | ranges | {"kind": self.kind.name}
 
@@ -156,7 +156,7 @@ class _Box:
         return list(dict.fromkeys((float(one[0]) * wide, float(one[1]) * high) for one in points))
 
     def _solve(self, places: list[tuple[float, float]]) -> tuple[np.ndarray, float]:
-        """Answers, shape (n_places, 4), and the largest error estimate of them; what was solved is known."""
+        """Return answers (n_places, 4) and their largest error estimate; each place is solved once."""
         from .small_strain import ReferenceNotConvergedError
 
         # Elements are shared by those of one aspect ratio, which follow each other.
@@ -174,7 +174,7 @@ class _Box:
         return np.array([answers for answers, _ in found_here]), max(estimate for _, estimate in found_here)
 
     def _error_at_checks(self, values: np.ndarray, checks: list[tuple[float, float]], estimate: float) -> float:
-        """Error estimate by solves at the checks, given that of the nodes."""
+        """Return the error estimate by solves at the checks, from the error estimate of the nodes."""
         if values[0].size == 1:
             return estimate
         solved, of_checks = self._solve(checks)
@@ -238,7 +238,7 @@ def _expected_error(values: np.ndarray) -> float:
 
 
 def _place(values: np.ndarray, ends: ArrayLike) -> np.ndarray:
-    """Place between two ends, -1 to 1; where these are one, 0 for it and else infinite."""
+    """Map values between two ends to -1 to 1; if the ends are equal, to 0 at them and infinity elsewhere."""
     first, last = np.asarray(ends, float)
     if last > first:
         return (2 * values - first - last) / (last - first)
@@ -246,6 +246,6 @@ def _place(values: np.ndarray, ends: ArrayLike) -> np.ndarray:
 
 
 def _value_at_place(place: float, ends: ArrayLike) -> float:
-    """Inverse of `_place`."""
+    """Map a place in -1 to 1 to the value there, the inverse of `_place`."""
     first, last = np.asarray(ends, float)
     return float((first + last) / 2 + place * (last - first) / 2)

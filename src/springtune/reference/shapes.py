@@ -142,10 +142,10 @@ def solve_shape(
         if not complaint:
             last_values, kinds, errors = values[-1], problem.kinds, {name: estimates[name] for name in names}
             size = {name: abs(last_values[name]) for name in names}
-            told = {name: last_values[name] if size[name] > ZERO_BOUND_FACTOR * bounds[name] else 0.0 for name in names}
+            sure = {name: last_values[name] if size[name] > ZERO_BOUND_FACTOR * bounds[name] else 0.0 for name in names}
             little = tuple(name for name in names if size[name] < NEGLIGIBLE_SHARE * level.scale(kinds[name]))
             limits = *level.rotation_and_strain(), level.unknowns
-            return ShapeReference(told, errors, last_values[""], *limits, level, kinds, little, level.note)
+            return ShapeReference(sure, errors, last_values[""], *limits, level, kinds, little, level.note)
     raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
 
 
@@ -316,7 +316,7 @@ class Problem:
         quantity = self._quantities.get(name)
         if quantity and self.reacting and quantity.kind != "reaction":
             names = ", ".join(map(repr, dict.fromkeys(self.reacting)))
-            return f"; held points carry forces, under which a continuum gives way without end: hold sides, not {names}"
+            return f"; held points carry forces, which displace a continuum without limit: hold sides, not {names}"
         if quantity is None or quantity.of not in self.points:
             return ""
         corner = self.corners.get(self.mesh.named.get(quantity.of, -1))
@@ -326,14 +326,14 @@ class Problem:
         return f"; {quantity.of!r} is where {corner.what}: {then}"
 
     def graded(self, layers: int) -> CoarseMesh:
-        """The mesh with so many layers at its corners; call it with rising numbers."""
+        """Return the mesh with `layers` of graded triangles at its corners; call it with rising numbers."""
         while self._layers < layers:
             self._graded.grade(self.rough)
             self._layers += 1
         return self._graded.copy()
 
     def size(self, degree: int) -> int:
-        """Entries of the matrices of a level, about."""
+        """Approximate number of entries of a level's matrices."""
         return len(self._graded.triangles) * ((degree + 1) * (degree + 2)) ** 2
 
 

@@ -35,23 +35,23 @@ ELEMENT_GROWTH = 3.0
 #: has no more; estimates of rounding follow.
 EXTENDED_DTYPE = np.longdouble
 
-#: Relative rounding of a displacement from which on a solution is not refined any more.
+#: Relative rounding of a displacement at which refinement stops.
 REFINED_ROUNDING = 5e-14
 
 #: Most corrections of a solution.
 MOST_CORRECTIONS = 40
 
-#: Error of a displacement from the twelve digits of a unit problem's aspect ratio, at most its third power, relative.
+#: Relative error of a displacement from the twelve digits of a unit problem's aspect ratio, whose cube it may contain.
 ASPECT_ROUNDING = 2e-12
 
 #: Largest ratio of the sides of a body that bends, see `_largest_ratio`. Beyond some ratio the corrections do not
 #: converge; which one depends on the processor's arithmetic. On all that were tried it is at least 15 % above this one.
 MOST_BENT_RATIO = 7000.0
 
-#: What is added to the diagonal of a matrix before it is factorized, relative.
+#: Relative shift of a matrix's diagonal before it is factorized.
 DIAGONAL_SHIFT = 1e-15
 
-#: Number of points of the field that is handed out, about.
+#: Approximate number of points of the returned field.
 FIELD_POINTS = 3000
 
 #: Signs, places and matrices that take coefficients to displacements on a grid, see `_Grid.values`.
@@ -142,7 +142,7 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
 
 
 def _bending_ratio(aspect_ratio: float, kind: LoadKind) -> float:
-    """Ratio of the side that bends to the side that the force is along; 0 if such a side is held against the force."""
+    """Length of the bending side over that of the side along the force; 0 if supports on one resist the force."""
     if any(side.axis == kind.axis and kind.axis in axes for side, axes in kind.held):
         return 0.0
     return aspect_ratio if kind.axis == 1 else 1 / aspect_ratio
@@ -246,7 +246,7 @@ class _Grid:
         return tuple(block_array(one, format="csc") for one in (direct, [[None, lateral], [lateral.T, None]], shear))
 
     def solve(self, nu: float) -> tuple[np.ndarray, float, float | None, float]:
-        """Unknowns for a Poisson's ratio, energy, displacement of a pressed side's middle if any, rounding."""
+        """Return unknowns, energy, displacement of a pressed side's middle or None, and the relative rounding error."""
         one = EXTENDED_DTYPE(1)
         direct, shear = one / (1 - one * nu * nu), one / (2 * (1 + one * nu))
         matrix = float(direct) * (self._direct + nu * self._lateral) + float(shear) * self._shear
@@ -283,7 +283,7 @@ class _Grid:
     def _forces(
         self, solution: np.ndarray, direct: np.floating, nu: float, shear: np.floating, other: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.floating]:
-        """Return inner forces in extended precision, and the unsigned work of stresses on strains.
+        """Return internal forces in extended precision, and the unsigned work of stresses on strains.
 
         Never by the matrix: so only the large displacements of a slender beam cancel, not its forces.
         """
@@ -324,7 +324,7 @@ class _Grid:
 
     @cached_property
     def plot_points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates along x and y of the points of the field that is handed out."""
+        """Coordinates along x and y of the points of the returned field."""
         spacing = (2 * self._length / FIELD_POINTS) ** 0.5
         x, half = _plot_points(self._length / 2, spacing), 1 - _plot_points(1.0, spacing)[::-1]
         return np.concatenate([x, self._length - x[-2::-1]]), np.concatenate([-half[:0:-1], half])
@@ -410,6 +410,6 @@ def _graded_both(length: float, layers: int) -> np.ndarray:
 
 
 def _plot_points(length: float, spacing: float) -> np.ndarray:
-    """Points from 0 to length, evenly spaced but for the first interval, which is halved some times towards 0."""
+    """Points from 0 to length, evenly spaced but for the first interval, which is halved repeatedly towards 0."""
     even = np.linspace(0, length, max(2, ceil(length / spacing)) + 1)
     return np.concatenate([[0.0], even[1] / [16, 8, 4, 2], even[1:]])

@@ -74,7 +74,7 @@ class CoarseMesh:
     named: dict[str, int]
 
     def copy(self) -> "CoarseMesh":
-        """A mesh that may be cut for itself."""
+        """Return a copy, which can be cut without changing this mesh."""
         return replace(self, sides=dict(self.sides))
 
     def curve(self, ends: _Ends, along: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ class CoarseMesh:
         return where
 
     def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]]) -> None:
-        """Put triangles in the place of those of some rows, as many for each."""
+        """Replace triangles, each by the same number of new ones."""
         parts = np.repeat(self.parts[rows], len(triangles) // len(rows))
         self.triangles = np.concatenate([np.delete(self.triangles, rows, axis=0), np.array(triangles)])
         self.parts = np.concatenate([np.delete(self.parts, rows), parts])
@@ -143,16 +143,16 @@ class CoarseMesh:
 
     def part_sides(self) -> dict[_Ends, list[tuple[int, bool]]]:
         """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
-        wanted: dict[_Ends, list[tuple[int, bool]]] = {ends: [] for ends in self.sides}
+        triangles_at: dict[_Ends, list[tuple[int, bool]]] = {ends: [] for ends in self.sides}
         corners = np.zeros(self.triangles.max() + 1, dtype=bool)
-        corners[[end for ends in wanted for end in ends]] = True
+        corners[[end for ends in triangles_at for end in ends]] = True
         for i in range(3):
             starts, ends = self.triangles[:, i], self.triangles[:, (i + 1) % 3]
             for row in np.flatnonzero(corners[starts] & corners[ends]):
                 start, end = int(starts[row]), int(ends[row])
-                if (found := wanted.get((min(start, end), max(start, end)))) is not None:
+                if (found := triangles_at.get((min(start, end), max(start, end)))) is not None:
                     found.append((int(row), start < end))
-        return wanted
+        return triangles_at
 
     def isolate(self, corners: Iterable[int]) -> None:
         """Bisect sides until no triangle has two of some corners."""
@@ -262,7 +262,7 @@ def outline_mesh(
     pieces: list[_Piece] = []
     placed: set[str] = set()
     for piece in whole:
-        on_it = piece.side.find_on_it(points, LENGTH_TOLERANCE * extent)
+        on_it = piece.side.find_points(points, LENGTH_TOLERANCE * extent)
         placed.update(on_it)
         pieces += piece.cut(sorted({0.0, 1.0, *on_it.values()}))
     mesh = _triangulated(shape.name, _refine_pieces(pieces, extent, largest_turn), names, extent)

@@ -14,15 +14,15 @@ from ..mechanics.energies import area_slopes
 from ..mechanics.network import FollowerPressure, Network
 from ..mesh.cells import Mesh
 from ..mesh.sheets import GroupedMesh, box_fault, part_names, parts_of
-from ..mesh.sides import OutlineSide, away, in_words
+from ..mesh.sides import OutlineSide, distances, in_words
 from ..problem import boundary
 from ..problem.loads import LOADS, Load, LoadKind
-from ..problem.materials import AnyMaterial, Material, of_parts
+from ..problem.materials import AnyMaterial, Material, materials_by_part
 from ..problem.quantities import choose, positive
 from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_body
 from ..reference.answers import beyond_linear
 from ..springs.base import Definition, DefinitionError, Springs
-from .mesh_cache import Loading, MeshCache, Solution, is_a, solve_and_judge
+from .mesh_cache import Loading, MeshCache, Solution, check_type, solve_and_judge
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
@@ -86,7 +86,7 @@ class BoundaryProblem(ABC):
         return dict(found.values)
 
     def law(self, definition: Definition) -> str:
-        """Law at finite strain of the reference of a definition's network; none of small strain."""
+        """Law at finite strain of the reference of a definition's network; empty for a small-strain reference."""
         return definition.law if self.kinematics == "nonlinear" else ""
 
     def objection(self) -> str:
@@ -129,14 +129,14 @@ class BoundaryProblem(ABC):
         """Displacement of interest [m]."""
         return float(np.tensordot(moved, boundary.displacement_weights(self.grouped, one), axes=2))
 
-    def none(self) -> dict[str, float]:
-        """Quantities of interest without an equilibrium: NaN."""
+    def empty(self) -> dict[str, float]:
+        """Values of the quantities of interest if there is no equilibrium: NaN."""
         return dict.fromkeys((one.name for one in self.case.quantities), np.nan)
 
     def values(self, springs: Springs, solution: Solution) -> dict[str, float]:
         """Quantities of interest by name, in SI units; NaN without an equilibrium."""
         if not solution.equilibrium.converged:
-            return self.none()
+            return self.empty()
         first, *others = self.case.quantities
         network, moved = solution.problem.network, solution.equilibrium.displacements
         rest = {one.name: self._value(one, springs, network, moved) for one in others}
@@ -185,9 +185,9 @@ class BeamProblem(BoundaryProblem):
         kinematics: str,
         cache: MeshCache | None = None,
     ) -> None:
-        is_a(beam, Beam, "beam")
-        mesh = is_a(mesh, Mesh, "mesh")
-        self.material: Material = is_a(material, Material, "material")
+        check_type(beam, Beam, "beam")
+        mesh = check_type(mesh, Mesh, "mesh")
+        self.material: Material = check_type(material, Material, "material")
         self.cache = cache_of(mesh, beam.thickness, cache)
         if beam not in self.cache.filled:
             check_filled(mesh, beam)
@@ -243,8 +243,8 @@ class ShapeProblem(BoundaryProblem):
         kinematics: str,
         cache: MeshCache | None = None,
     ) -> None:
-        is_a(shape, Shape, "shape")
-        grouped = is_a(grouped, GroupedMesh, "mesh")
+        check_type(shape, Shape, "shape")
+        grouped = check_type(grouped, GroupedMesh, "mesh")
         self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)
@@ -257,7 +257,7 @@ class ShapeProblem(BoundaryProblem):
         self.case = scaled(choose(shape.loads, load, "load"), self.scale)
         self.load, self.cache = self.case.name, cache_of(self.mesh, self.thickness, cache)
         if not self.case.quantities:
-            raise ValueError(f"load {load!r}: asks for nothing; give it quantities, the main one first")
+            raise ValueError(f"load {load!r}: has no quantities; give it some, the main one first")
         self.kinematics = kinematics
         factor = "" if self.scale == 1 else f" times {self.scale:g}"
         self.body, self.label = shape.name, f"{load}{factor}"
@@ -267,13 +267,13 @@ class ShapeProblem(BoundaryProblem):
 
     def _loading(self) -> Loading:
         boundary.check_case(self.grouped, self.case)
-        held, given = boundary.supported(self.grouped, self.case)
+        held, given = boundary.support_directions(self.grouped, self.case)
         densities = {name: one.density for name, one in self.by_part.items()}
         all_forces = partial(boundary.forces, self.grouped, self.case, self.thickness, densities)
         pattern = all_forces()
         if not (pattern[~held].any() or given.any()):
             raise ValueError(f"load {self.load!r}: neither pulls what is free nor moves a support; give a force")
-        edges, pressure = boundary.followed(self.grouped, self.case, self.thickness)
+        edges, pressure = boundary.follower_edges(self.grouped, self.case, self.thickness)
         turning = self.kinematics == "nonlinear" and len(edges) > 0
         key = self.grouped, self.case, self.thickness, tuple(densities.items()), turning
         follower = FollowerPressure(self.mesh, edges, pressure) if turning else None
@@ -281,7 +281,7 @@ class ShapeProblem(BoundaryProblem):
         return Loading(key, held, pattern, given if given.any() else None, follower, dead)
 
     def _check(self, one: Quantity) -> None:
-        """Refuse a stress where different materials meet; `boundary.check_case` refuses what else cannot be read."""
+        """Refuse a stress where different materials meet; `boundary.check_case` refuses other quantities."""
         if one.kind != "stress" or (particle := self.grouped.particle(one.of)) is None:
             return
         found = set()
@@ -359,15 +359,15 @@ def scaled(case: LoadCase, scale: float) -> LoadCase:
 
 
 def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: GroupedMesh) -> dict[str, AnyMaterial]:
-    """Material of each part that the mesh has, checked."""
+    """Return the material of each part of the mesh; refuse missing and unknown ones."""
     parts = parts_of(grouped)
     given = dict(material) if isinstance(material, Mapping) else {"": material}
     for name, one in given.items():
-        is_a(one, AnyMaterial, f"material of part {name!r}" if name else "material")
+        check_type(one, AnyMaterial, f"material of part {name!r}" if name else "material")
         if name and name not in parts:
             known = f"is no part of the mesh; known: {', '.join(map(repr, parts))}"
             raise ValueError(f"material: {name!r} {grouped.unusable.get(name, known)}")
-    return of_parts(given, parts)
+    return materials_by_part(given, parts)
 
 
 def _growth(mesh: Mesh, displacements: np.ndarray, linear: bool) -> float:
@@ -386,8 +386,8 @@ def check_filled(mesh: Mesh, beam: Beam) -> None:
     remedy = "make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
     if np.abs(np.concatenate([low, high - box])).max() > MOST_GAP * box.max():
         shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
-        wanted = " x ".join(f"{side:.6g}" for side in 1e3 * box)
-        raise ValueError(f"mesh: extends over {shown} mm, its beam over {wanted} mm from the origin; {remedy}")
+        of_beam = " x ".join(f"{side:.6g}" for side in 1e3 * box)
+        raise ValueError(f"mesh: extends over {shown} mm, its beam over {of_beam} mm from the origin; {remedy}")
     if wrong := box_fault(mesh):
         raise ValueError(f"mesh: does not fill its beam: {wrong}; or {remedy}")
 
@@ -440,7 +440,7 @@ def _between(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> np.n
 def _distances(side: OutlineSide, points: np.ndarray) -> np.ndarray:
     """Distances of points from a side [m], shape (n,); on an ellipse only for points close to it."""
     if side.arc is None or side.centre is None:
-        return away(points, np.array([side.start]), np.array([side.end]))
+        return distances(points, np.array([side.start]), np.array([side.end]))
     axes, (begin, turn) = np.array(side.arc[:2]), side.arc[2:]
     x, y = ((points - side.centre) / axes).T
     # From the middle of the arc, so that no turn is cut.

@@ -37,8 +37,8 @@ def follow(cache: MeshCache, kind: LoadKind, kinematics: str, loads: np.ndarray)
     return (LinearPath if kinematics == "linear" else StablePath)(problem, cache.measured(kind), loads)
 
 
-def meeting(path: CurvePath, force: float, stiffness: np.ndarray, reference: float, objection: str) -> Best:
-    """Stiffness at which a path, asked at stiffnesses [N/m], meets its reference [m]; force in N."""
+def meeting_stiffness(path: CurvePath, force: float, stiffness: np.ndarray, reference: float, objection: str) -> Best:
+    """Find the stiffness at which a path's displacement is the reference [m]; stiffnesses in N/m, force in N."""
     if objection:
         return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")
     best = best_stiffness(stiffness, path.values, path.stable, reference, lambda one: path.value(force / one))
@@ -48,11 +48,11 @@ def meeting(path: CurvePath, force: float, stiffness: np.ndarray, reference: flo
     return best
 
 
-def ending(path: CurvePath, force: float) -> str:
-    """Why a curve is not solved throughout; empty where it is."""
+def incomplete_reason(path: CurvePath, force: float) -> str:
+    """Return why a curve is not solved at all its stiffnesses, or an empty string."""
     if path.stable.all():
         return ""
-    reason = path.end or "not followed through its turn"
+    reason = path.end or "not followed beyond its turning point"
     return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
 
 
@@ -176,8 +176,8 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         reference, objection = np.nan, f"no reference: {error}"
     faces = np.concatenate([scene.mesh.outline_edges(1, value) for value in (0.0, scene.mesh.points[:, 1].max())])
     edge = float(np.median(np.abs(np.diff(scene.mesh.points[faces, 0]))))
-    best = meeting(path, force, stiffness, reference, objection)
+    best = meeting_stiffness(path, force, stiffness, reference, objection)
     predicted = predicted_stiffness(scene.material, beam, edge, scene.load)
-    off, why = deformation_error(path.values, reference), ending(path, force)
+    off, why = deformation_error(path.values, reference), incomplete_reason(path, force)
     title, found = f"{beam.label}, {scene.load} of {abs(force):g} N", (best.stiffness, best.status, best.message)
     return Curve(stiffness, path.values, off, path.stable, why, *found, predicted, title)

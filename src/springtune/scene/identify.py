@@ -1,7 +1,7 @@
-"""Constants of a sheet from measured tests, with their uncertainty, and what the tests do not tell.
+"""Constants of a sheet from measured tests, with their uncertainty, and the constants that the tests do not determine.
 
 Least squares of residuals over their noise, with exact derivatives J, both without shifts: the covariance of the
-unknowns is :math:`(J^T J)^{-1}`. Along a direction in which J vanishes the tests tell nothing.
+unknowns is :math:`(J^T J)^{-1}`. Tests do not determine constants along directions in which J vanishes.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
 from ..safe_io import Tabled, number_of
 from .measured import Block, MeasuredTest, blocks, body_of_test
-from .mesh_cache import is_a
+from .mesh_cache import check_type
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,36 +32,36 @@ SHEET_LAWS = {"isotropic": ("E", "nu"), "orthotropic": ("E1", "E2", "nu12", "G12
 """Laws, and the names of their constants; regions have a modulus each, too, such as ``E core``."""
 
 USUAL_POISSON_RATIOS = {"nu": 0.3, "nu12": 0.3}
-"""Poisson's ratios where a search begins, and which are assumed where tests do not tell."""
+"""Poisson's ratios where a search begins, and which are assumed if tests do not determine them."""
 
 REMEDIES = {"G12": "add a test in shear, or of a coupon cut at 45 degrees", "E2": "add a coupon cut across"}
 REMEDIES |= dict.fromkeys(USUAL_POISSON_RATIOS, "add a transverse displacement or a field, or give it as known")
 """Test to add where a constant is not determined; for others a force."""
 
 LEAST_DERIVATIVE = 1e-7
-"""Derivative by a constant besides those by others, over the largest, below which tests do not tell the constant."""
+"""Derivative by a constant besides those by others, over the largest, below which a constant is undetermined."""
 
 POISSON_STEP = 0.1  # change of a Poisson's ratio that is as likely as one of a modulus by a factor e
 
-POOR_HALF_INTERVAL = 0.5  # half of an interval from which on a constant is poorly determined: of a ratio, or relative
+POOR_HALF_INTERVAL = 0.5  # half of an interval above which a constant is poorly determined: of a ratio, or relative
 
 MISFIT_PROBABILITY = 0.01  # probability of residuals by chance below which a law misfits
 
 EXPLAINED_SHARE = 0.5
-"""Share of a field's squares below which, with residuals that are not random, it is not of its load."""
+"""Least share of a field's squares that the load must explain, if residuals are not random."""
 
 REFERENCE_ERROR = 3e-4  # error of the reference over the values' root mean square, below which residuals tell nothing
 
 LEAST_NOISE = 1e-9  # noise over the values' root mean square that is rounding
 
 
-OUTLIER_DEVIATIONS = 5.0  # deviations from which on a value is no measurement; more of few values
+OUTLIER_DEVIATIONS = 5.0  # deviations above which a value is an outlier; more if there are few values
 
-FEWEST_POINTS = 10  # places from which on their residuals are looked at
+FEWEST_POINTS = 10  # fewest places whose residuals are checked
 
 DEVIATION_OVER_MEDIAN = 1.4826  # standard deviation over the median of magnitudes
 
-CORRELATION_DEVIATIONS = 2.75  # deviations of the correlation of neighbours from which on it is no chance
+CORRELATION_DEVIATIONS = 2.75  # deviations above which a correlation of neighbours is not by chance
 
 
 def vary(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:
@@ -143,14 +143,14 @@ class Model:
             found += [block.factors[:, None] * (block.rows @ moved) for block in own]
         return found
 
-    def cleaned(self, constants: dict[str, Any]) -> tuple["Model", list[str]]:
-        """Model without values that are no measurements, and notes on these."""
+    def without_outliers(self, constants: dict[str, Any]) -> tuple["Model", list[str]]:
+        """Return the model without outliers, and notes on them."""
         notes, kept = [], []
         for block, table in zip(self.blocks, self.general(constants)):
             floor = 10 * REFERENCE_ERROR * np.sqrt(np.mean(table[:, 0] ** 2))
             columns = block.by_place(np.hstack([table, block.shifts]))
             stay = find_measurements(block.by_place(block.values), columns, block.places, floor)
-            kept.append(block.only(stay))
+            kept.append(block.select(stay))
             if not stay.all():
                 where = ", ".join(f"{1e3 * one:.4g} mm" for one in np.atleast_2d(block.places[~stay])[0])
                 where = f"x, y = {where}" if block.places.ndim > 1 else f"a load of {block.places[~stay][0]:g} N"
@@ -216,7 +216,7 @@ class Identified(Tabled):
     ----------
     law : str
     values, intervals : dict of str to float, dict of str to (float, float)
-        Moduli in Pa, assumed where the tests do not tell, and 95 % intervals; NaN if known or undetermined.
+        Moduli in Pa, assumed if undetermined, and 95 % intervals; these are NaN if known or undetermined.
     undetermined, notes : tuple of str
         Constants that the tests do not determine, with the remedy, and signs that the model does not fit.
     noise : dict of str to float
@@ -315,7 +315,7 @@ def identify(
     constants_of_law = choose(SHEET_LAWS, law, "law")
     tests = list(tests) if isinstance(tests, Sequence) else [tests]
     for test in tests:
-        is_a(test, MeasuredTest, "tests")
+        check_type(test, MeasuredTest, "tests")
     bodies = [*map(body_of_test, tests)]
     parts = sorted({part for shape, _, mesh in bodies for part in (parts_of(mesh) if mesh else ("", *shape.parts))})
     regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []
@@ -323,14 +323,14 @@ def identify(
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")
     constants, free = _start([*regions, *constants_of_law], known or {})
     moduli = [name for name in free if name not in USUAL_POISSON_RATIOS]
-    for turn in range(5):  # elements for a usual material, then for what was found, until what is assumed settles
+    for turn in range(5):  # elements for a usual material, then for the found one, until assumed constants settle
         solved = []
         for test, body in zip(tests, bodies):
             own = dict(zip(parts, entries(limit_anisotropy(constants), test.angle).tolist()))
             family = Family(*body, {part: AnisotropicMaterial(*one) for part, one in own.items()})
             solved.append((family, blocks(test, family, body[1]), test.angle))
         model = Model(solved)
-        model, notes = model.cleaned(constants)
+        model, notes = model.without_outliers(constants)
         constants = vary(constants, moduli, [_scale(model, constants)] * len(moduli))
         lacking, found, *_ = _fitted(model, constants, free)
         settled = all(np.isclose(constants[name], found[name], rtol=0.01) for name in lacking)
@@ -370,14 +370,14 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str,
 
 
 def _scale(model: Model, constants: dict[str, Any]) -> float:
-    """Logarithm of the factor by which all moduli are larger than those that are given."""
+    """Logarithm of the factor on all moduli with which they fit the tests on average."""
     found = [0.0]
     for block, table in zip(model.blocks, model.residuals(constants, (), np.ones(len(model.blocks)))):
         own = block.unshifted(block.values)
         predicted = table[:, 0] + own
         share = predicted @ own / (np.linalg.norm(predicted) * np.linalg.norm(own) or 1)
         if block.places.ndim > 1 and share * np.sqrt(len(own)) < -4:
-            raise TestDataError(f"{block.label}: runs against the load; change the sign of its displacements")
+            raise TestDataError(f"{block.label}: is opposite to the load; change the sign of its displacements")
         if predicted @ own > 0:
             found.append(np.log(predicted @ predicted / (predicted @ own)))
     return float(np.sum(found) / max(len(found) - 1, 1))
@@ -401,7 +401,7 @@ def _fitted(
 
 
 def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequence[str], notes: list[str]) -> Identified:
-    """Result of a fit, with notes on what tests do not tell, and where the model does not fit; without materials."""
+    """Result of a fit without materials, with notes on undetermined constants and on misfits of the model."""
     lacking, constants, tables, noise, half = _fitted(model, constants, free)
     names = [name for name in free if name not in lacking]
     odd = _checked(model, constants, tables, noise)
@@ -451,12 +451,12 @@ def _checked(model: Model, constants: dict[str, Any], tables: list[np.ndarray], 
     return notes
 
 
-# -- which values are no measurements, and whether the residuals of the others are random -----------------------------
+# -- which values are outliers, and whether the residuals of the others are random ------------------------------------
 # Arrays: values (n_places, n_components), columns (n_places, n_components, n), places (n_places,) or (n_places, 2).
 
 
 def find_measurements(values: np.ndarray, columns: np.ndarray, places: np.ndarray, floor: float) -> np.ndarray:
-    """Return which places are measurements: others repeat a value that does not fit, or are far from all near."""
+    """Return which places to keep: outliers repeat a value that does not fit, or are far from their neighbours."""
     count = len(places)
     if count < FEWEST_POINTS:
         return np.ones(count, bool)
@@ -464,24 +464,24 @@ def find_measurements(values: np.ndarray, columns: np.ndarray, places: np.ndarra
     begin = (spread <= 100 * np.median(spread, axis=0)).all(axis=1) & ((values != 0).any(axis=1) | (places.ndim == 1))
     begin = begin if begin.sum() >= FEWEST_POINTS else np.ones(count, bool)
     table = columns[begin].reshape(-1, columns.shape[-1])
-    sizes, wanted, weights = np.linalg.norm(table, axis=0) + 1e-300, values[begin].ravel(), np.ones(table.shape[:1])
+    sizes, target, weights = np.linalg.norm(table, axis=0) + 1e-300, values[begin].ravel(), np.ones(table.shape[:1])
     for _ in range(30):
-        found = np.linalg.lstsq(table / sizes * weights[:, None], wanted * weights, rcond=1e-9)[0] / sizes
-        apart = np.abs(wanted - table @ found)
+        found = np.linalg.lstsq(table / sizes * weights[:, None], target * weights, rcond=1e-9)[0] / sizes
+        apart = np.abs(target - table @ found)
         weights = np.maximum(apart, 1e-3 * np.median(apart) + 1e-300) ** -0.5
     apart, limit = values - columns @ found, OUTLIER_DEVIATIONS * (1 + FEWEST_POINTS / count)
     far = np.abs(apart) > limit * np.maximum(DEVIATION_OVER_MEDIAN * np.median(np.abs(apart[begin]), axis=0), floor)
-    gone = np.zeros(count, bool)
+    outliers = np.zeros(count, bool)
     for number in range(values.shape[1] * (places.ndim - 1)):  # of fields
         _, group, sizes = np.unique(values[:, number], return_inverse=True, return_counts=True)
-        gone |= ((sizes > 2) & (np.bincount(group, far[:, number]) >= sizes / 2))[group]
-    rest = np.flatnonzero(~gone)
+        outliers |= ((sizes > 2) & (np.bincount(group, far[:, number]) >= sizes / 2))[group]
+    rest = np.flatnonzero(~outliers)
     if len(rest) >= FEWEST_POINTS:
         near = _nearest(places[rest])[:, 1:]
-        alone = np.abs(apart[rest] - np.median(apart[rest][near], axis=1))
-        own = np.maximum(DEVIATION_OVER_MEDIAN * np.median(alone, axis=0), floor)
-        gone[rest[(far[rest] & (alone > limit * own)).any(axis=1)]] = True
-    return ~gone
+        apart_from_near = np.abs(apart[rest] - np.median(apart[rest][near], axis=1))
+        own = np.maximum(DEVIATION_OVER_MEDIAN * np.median(apart_from_near, axis=0), floor)
+        outliers[rest[(far[rest] & (apart_from_near > limit * own)).any(axis=1)]] = True
+    return ~outliers
 
 
 def _nearest(places: np.ndarray) -> np.ndarray:
@@ -492,7 +492,7 @@ def _nearest(places: np.ndarray) -> np.ndarray:
 
 
 def correlation_excess(residual: np.ndarray, places: np.ndarray) -> float:
-    """Correlation of neighbours less what chance may yield; above 0 residuals are not random."""
+    """Return the correlation of neighbours less its limit by chance; above 0 residuals are not random."""
     if len(places) < FEWEST_POINTS or not residual.any():
         return -1.0
     if places.ndim == 1:

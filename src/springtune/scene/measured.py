@@ -16,7 +16,7 @@ from ..problem.quantities import Number, choose, nearest, positive, put, quantit
 from ..problem.shapes import Beam, LoadCase, Segment, Shape
 from ..reference.by_constants import Family
 from ..safe_io import csv_rows, number_of, numbers
-from .mesh_cache import is_a
+from .mesh_cache import check_type
 
 FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")
 """Columns of a field, and those that a curve has at least."""
@@ -33,7 +33,7 @@ MOST_DISTANCE_FROM_BODY = 1e-3  # distance from the body, over its extent, up to
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Numbers of a file: `values` (n,) are `factors` times what `rows` read; what `shifts` explain tells nothing."""
+    """Numbers of a file: `values` (n,) are `factors` times what `rows` read; their part along `shifts` is not used."""
 
     label: str
     values: np.ndarray
@@ -50,7 +50,7 @@ class Block:
         """Columns (n, ...) as (n_places, n_components, ...)."""
         return columns.reshape(len(self.places), -1, *columns.shape[1:])
 
-    def only(self, stay: np.ndarray) -> "Block":
+    def select(self, stay: np.ndarray) -> "Block":
         """The block of some places, marked (n_places,)."""
         own = np.repeat(stay, len(self.values) // len(stay))
         rows = self.rows[own] if self.rows.shape[0] == len(own) else self.rows
@@ -109,7 +109,7 @@ class MeasuredTest:
     _missing: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        is_a(self.body, Beam | Shape, "body")
+        check_type(self.body, Beam | Shape, "body")
         choose(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         columns, lines, missing = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)
@@ -167,7 +167,7 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
         same = f"all {len(loads)} values are {loads[0]:g} in SI units"
         raise TestDataError(f"{where}, column 'force': {same}; give others, or no shift")
     if (loads - loads.mean()) @ test.columns["displacement"] < 0:
-        raise TestDataError(f"displacement of {where}: runs against the load; change a column's sign")
+        raise TestDataError(f"displacement of {where}: is opposite to the load; change a column's sign")
     factors = loads / np.hypot(*load.tractions[0].force)
     shifts = np.full((len(loads), int(test.shift)), len(loads) ** -0.5)
     return [
@@ -220,7 +220,7 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
         if (far := np.abs(values) > LARGEST_MEASUREMENT / scale).any():
             worst = int(np.argmax(far))
             where = f"'{path}', line {rows[worst][0]}, column {name!r}"
-            raise TestDataError(f"{where}: {values[worst]:g} {unit} is beyond all measure; correct it")
+            raise TestDataError(f"{where}: {values[worst]:g} {unit} is far out of range; correct it")
         columns[name] = scale * values
     if not rows:
         raise TestDataError(f"'{path}': has no rows of numbers below its head; {HEADS}")

@@ -17,9 +17,9 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh.cells import Mesh, share_edges
 from ..mesh.sheets import GroupedMesh
-from ..problem.boundary import box, displacement_weights, even, supported
+from ..problem.boundary import box, displacement_weights, even_weights, support_directions
 from ..problem.loads import LoadKind
-from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
+from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, check_isotropic
 from ..problem.quantities import Status, choose, positive
 from ..problem.shapes import Beam, Shape
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
@@ -54,10 +54,10 @@ def definition_of(definition: AnyDefinition) -> Definition:
     return choose(DEFINITIONS, definition, "definition")
 
 
-def is_a(value: object, wanted: type[_T] | Any, name: str) -> _T:
-    """Return an argument; refuse another type."""
+def check_type(value: object, wanted: type[_T] | Any, name: str) -> _T:
+    """Return an argument of the expected type; refuse any other."""
     if wanted is Material and isinstance(value, AnisotropicMaterial):
-        only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
+        check_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
         first: Any = (*get_args(wanted), wanted)[0]
         example = EXAMPLES.get(first, f"springtune.{first.__name__}(...)")
@@ -66,7 +66,7 @@ def is_a(value: object, wanted: type[_T] | Any, name: str) -> _T:
 
 
 def given_stiffness(definition: Definition, stiffness: float | str | None) -> float | None:
-    """Uniform stiffness [N/m] that a definition needs; refuse one that it does not use, and none where it needs one."""
+    """Return the uniform stiffness [N/m] of a definition that needs one; refuse a missing or an unused one."""
     name, needed = definition.name, definition.needs == "stiffness"
     if needed and stiffness is None:
         raise ValueError(f"stiffness: definition {name!r} needs a uniform one; give a stiffness such as '170e6 N/m'")
@@ -98,9 +98,9 @@ class Loading:
 
 def box_loading(grouped: GroupedMesh, kind: LoadKind, follower: bool) -> Loading:
     """Load of 1 N on a box; with `follower` it turns with its side."""
-    side, (held, _) = kind.loaded.name, supported(grouped, kind.case)
+    side, (held, _) = kind.loaded.name, support_directions(grouped, kind.case)
     turning = FollowerPressure.of_side(grouped.mesh, grouped.sides[side], kind.along) if follower else None
-    return Loading((kind, follower), held, even(grouped, side, kind.axis), follower=turning)
+    return Loading((kind, follower), held, even_weights(grouped, side, kind.axis), follower=turning)
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class MeshCache:
     ) -> tuple[Springs, float]:
         """Derive the springs of a definition; return them and the seconds that this took.
 
-        `case`, for fitted definitions, is a load, its factor, and wanted displacements; by default tension and shear.
+        `case`, for fitted definitions, is a load, its factor, and target displacements; by default tension and shear.
         """
         definition = definition_of(definition)
         by_part = material if isinstance(material, Mapping) else {"": material}

@@ -11,11 +11,11 @@ from ..mechanics.continuum import PatchTest
 from ..mesh.cells import Mesh
 from ..mesh.sheets import bonded
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import choose, positive, whole
+from ..problem.quantities import choose, positive, whole_number
 from ..safe_io import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
-from .mesh_cache import AnyDefinition, MeshCache, definition_of, is_a, naming_errors
+from .mesh_cache import AnyDefinition, MeshCache, check_type, definition_of, naming_errors
 
 START_DEFINITIONS = ("van-gelder", "lattice", "energy-fit")  # definitions from whose springs searches start
 
@@ -73,10 +73,10 @@ class Moduli:
     @property
     def stiffness_error(self) -> float:
         """Norm of the difference of `stiffness` from the material's, over the norm of the material's [1]."""
-        wanted = self.material.in_plane.plane_stress
+        target = self.material.in_plane.plane_stress
         # Twice the shear and its couplings: the norm of the tensor, which no turn of the axes changes.
         weights = np.sqrt(np.outer([1.0, 1.0, 2.0], [1.0, 1.0, 2.0]))
-        return float(np.linalg.norm(weights * (self.stiffness - wanted)) / np.linalg.norm(weights * wanted))
+        return float(np.linalg.norm(weights * (self.stiffness - target)) / np.linalg.norm(weights * target))
 
 
 class MeshModuli:
@@ -97,9 +97,9 @@ class MeshModuli:
         if name not in self._found:
             self._found[name] = *self._test.axial(springs), self._test.shear(springs)
         young, poisson, shear = self._found[name]
-        wanted = material.in_plane
-        scale = springs.reference / (wanted.young_modulus * self.cache.thickness)
-        return Moduli(young * scale - 1, poisson, shear * scale * 2 * (1 + wanted.poisson_ratio) - 1, *origin)
+        target = material.in_plane
+        scale = springs.reference / (target.young_modulus * self.cache.thickness)
+        return Moduli(young * scale - 1, poisson, shear * scale * 2 * (1 + target.poisson_ratio) - 1, *origin)
 
 
 def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
@@ -137,8 +137,8 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     >>> f"{abs(found.young_modulus_error):.6f} {found.poisson_ratio:.4f} {abs(found.shear_modulus_error):.6f}"
     '0.000000 0.3333 0.000000'
     """
-    is_a(mesh, Mesh, "mesh")
-    is_a(material, AnyMaterial, "material")
+    check_type(mesh, Mesh, "mesh")
+    check_type(material, AnyMaterial, "material")
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(f"definition {definition.name!r} needs a given stiffness; choose one such as 'uniform'")
@@ -265,12 +265,12 @@ def best_springs(
     >>> sorted(found.objectives), bool(found.springs.relative.min() > 0)
     (['energy-fit', 'lattice', 'van-gelder'], True)
     """
-    is_a(mesh, Mesh, "mesh")
-    is_a(material, AnyMaterial, "material")
+    check_type(mesh, Mesh, "mesh")
+    check_type(material, AnyMaterial, "material")
     if not isinstance(material, Material):
         raise DefinitionError("material: best springs are of isotropic ones; take definition 'energy-fit' for others")
     thickness = positive(thickness, "length", "thickness")
-    whole(evaluations, "evaluations")
+    whole_number(evaluations, "evaluations")
     if isinstance(starts, str) or not starts:
         raise ValueError(f"starts: {starts!r} is no list of definitions; give some such as {list(START_DEFINITIONS)}")
     begin, sought = time.perf_counter(), material.in_plane

@@ -27,7 +27,7 @@ from ..registry import hook
 from ..safe_io import Tabled, number_text
 from ..springs.base import Springs
 from .boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem
-from .mesh_cache import AnyDefinition, MeshCache, definition_of, given_stiffness, is_a, naming_errors
+from .mesh_cache import AnyDefinition, MeshCache, check_type, definition_of, given_stiffness, naming_errors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
     >>> len(mesh.points), len(mesh.edges)
     (415, 1143)
     """
-    is_a(beam, Beam, "beam")
+    check_type(beam, Beam, "beam")
     make, edge = choose(MESH_TYPES, mesh_type, "mesh type"), positive(size, "length", "mesh size")
     if refusal := make.refusal(beam.length, beam.height, edge, f"beam {beam.name!r}"):
         raise ValueError(f"mesh size: {size!r} {refusal}")
@@ -94,7 +94,7 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     >>> print(f"{1e6 * st.read_mesh('own.vtu', beam).area:.0f} mm2")
     2000 mm2
     """
-    is_a(beam, Beam, "beam")
+    check_type(beam, Beam, "beam")
     return read_beam_mesh(path, beam.length, beam.height, positive(unit, "length", "unit"))
 
 
@@ -123,7 +123,7 @@ def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | st
     >>> len(grouped.sides["hole"]), len(grouped.sides["right"])
     (52, 10)
     """
-    is_a(shape, Shape, "shape")
+    check_type(shape, Shape, "shape")
     sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
     return mesh_outlined(shape, positive(size, "length", "mesh size"), sizes)
 
@@ -362,7 +362,7 @@ class Scene(Tabled):
         except SingularError as error:  # of the network, or of the patch test that scales springs
             seconds = time.perf_counter() - begin
             times = (0.0, seconds) if derived is None else (seconds, derived)
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.boundary_problem.none())
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.boundary_problem.empty())
         seconds, values = time.perf_counter() - begin, self.boundary_problem.values(springs, solution)
         about = solution.equilibrium, solution.status, solution.message, solution.negative_pivots, solution.displacement
         return Result(self, *about, seconds, derived, values)

@@ -18,7 +18,7 @@ import numpy as np
 from ..mesh.cells import Mesh, signed_areas
 from ..mesh.rows import row_height
 from ..problem.materials import Material
-from .base import DefinitionError, Springs, definition, from_rectangles, not_negative, rectangles_only
+from .base import DefinitionError, Springs, check_not_negative, definition, from_rectangles, rectangle_sides
 
 SHAPE_TOLERANCE = 0.02
 """Largest difference of a mesh's own Poisson's ratio from the material's [1]: rows are stretched to fit a box."""
@@ -40,12 +40,12 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 
 def _rectangles(mesh: Mesh, nu: float) -> np.ndarray:
-    along, across = rectangles_only(mesh)
+    along, across = rectangle_sides(mesh)
     sides = mesh.points[mesh.quads[:, 1]] - mesh.points[mesh.quads[:, 0]]
     if np.abs(sides).min(axis=1).max() > 1e-9 * along.max():
         raise DefinitionError("needs rectangles with sides along x and y; use mesh type 'braced'")
     scale = 1 / (2 * along * across * (1 - nu**2))
-    first, second = (not_negative(scale * (b**2 - nu * a**2)) for a, b in ((along, across), (across, along)))
+    first, second = (check_not_negative(scale * (b**2 - nu * a**2)) for a, b in ((along, across), (across, along)))
     return from_rectangles(mesh, first, second, scale * nu * (along**2 + across**2))
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import beyond
+from ..problem.quantities import out_of_range
 from ..registry import Declaration, Registry
 
 
 class DefinitionError(ValueError):
-    """A definition that does not support a mesh or material; the message gives the reason and the remedy.
+    """A definition does not support a mesh or material; the message gives the reason and the remedy.
 
     Examples
     --------
@@ -174,9 +174,9 @@ class Definition(Declaration):
             fitting = [name for name in able if set(mesh.cells) <= set(DEFINITIONS[name].cells)]
             remedy = f"choose one of {', '.join(map(repr, fitting or able))}"
             raise DefinitionError(f"needs an isotropic material and {material.name!r} is anisotropic; {remedy}")
-        told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
-        for name, value in told:
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or beyond(value, name):
+        numbers = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
+        for name, value in numbers:
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or out_of_range(value, name):
                 raise DefinitionError(f"{name}: {value!r} is not a number above zero; give one in SI units")
         if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
             raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
@@ -184,7 +184,7 @@ class Definition(Declaration):
             why = f"has a law of sheets whose thickness is free, and {material.name!r} is in plane strain"
             raise DefinitionError(f"{why}; choose 'delingette', or plane 'stress'")
         if 4 not in self.cells:
-            triangles_only(mesh)
+            check_triangles(mesh)
         arguments = (given,) if self.needs else ()
         found = self.function(mesh, material.in_plane, thickness, *arguments)
         if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):
@@ -265,13 +265,13 @@ def membrane_stiffness(material: AnyMaterial, thickness: float) -> float:
     return float(np.diag(material.plane_stress).max()) * thickness
 
 
-def triangles_only(mesh: Mesh) -> None:
+def check_triangles(mesh: Mesh) -> None:
     """Refuse a mesh of quadrilaterals."""
     if len(mesh.quads):
         raise DefinitionError("needs triangles and the mesh has quadrilaterals; choose another mesh type")
 
 
-def rectangles_only(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+def rectangle_sides(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the lengths [m] of each rectangle's first and second side, shape (n_quads,); refuse any other mesh."""
     if len(mesh.triangles):
         raise DefinitionError("needs rectangles with both diagonals and the mesh has triangles; use mesh type 'braced'")
@@ -301,8 +301,8 @@ def _held_together(mesh: Mesh, stiffness: np.ndarray) -> None:
         raise DefinitionError(f"{why} of the mesh meet no resistance; {remedy}")
 
 
-def not_negative(stiffness: np.ndarray) -> np.ndarray:
-    """Stiffnesses, refused where one is negative: such a network need not be stable."""
+def check_not_negative(stiffness: np.ndarray) -> np.ndarray:
+    """Return stiffnesses; refuse negative ones, with which a network may be unstable."""
     stiffness = np.where(np.abs(stiffness) <= NO_STIFFNESS, 0.0, stiffness)
     bad = int((stiffness < 0).sum())
     if bad:

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh
 from ..problem.materials import Material
-from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
+from .base import Springs, check_not_negative, definition, from_rectangles, rectangle_sides
 
 
 @definition("baudet", order=100, cells=(4,))
@@ -32,11 +32,11 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Source: Baudet and others, HAL hal-01493734 and hal-00994456, 2006 to 2009 (abstract, derived).
     """
-    along, across = rectangles_only(mesh)
+    along, across = rectangle_sides(mesh)
     nu = material.poisson_ratio
     scale = 1 / (4 * along * across * (1 + nu))
-    first = not_negative(scale * ((3 * nu + 2) * across**2 - along**2))
-    second = not_negative(scale * ((3 * nu + 2) * along**2 - across**2))
+    first = check_not_negative(scale * ((3 * nu + 2) * across**2 - along**2))
+    second = check_not_negative(scale * ((3 * nu + 2) * along**2 - across**2))
     relative = from_rectangles(mesh, first, second, scale * (along**2 + across**2))
     return Springs(material.young_modulus * thickness, relative)
 

@@ -33,8 +33,8 @@ import numpy as np
 from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import van_gelder
-from .base import DefinitionError, Springs, definition, triangles_only
-from .identification import SPAN, tested_body
+from .base import DefinitionError, Springs, check_triangles, definition
+from .identification import MOST_RATIO, tested_body
 from .patch_fit import NU, polynomial_tests
 
 STRETCH_WEIGHT, DISPLACEMENT_WEIGHT, START_WEIGHT = 0.1, 0.1, 1e-3
@@ -74,7 +74,7 @@ class LoadSpace:
     def __init__(self, mesh: Mesh, nu: float = NU) -> None:
         from ..mechanics.network import Network  # here: see `springtune.springs`
 
-        triangles_only(mesh)
+        check_triangles(mesh)
         self.mesh, self.nu = mesh, nu
         self.network = Network(mesh, tested_body(mesh), np.ones(len(mesh.edges)))
         self.normals = self.network.rest_vectors / self.network.rest_lengths[:, None]
@@ -161,7 +161,7 @@ class LoadSpace:
             step = start if any_sign else stiffness
             return float(value), slope * step + 2 * START_WEIGHT / len(change) * change
 
-        bounds = [(-SPAN, SPAN) if any_sign else (-math.log(SPAN), math.log(SPAN))] * len(start)
+        bounds = [(-MOST_RATIO, MOST_RATIO) if any_sign else (-math.log(MOST_RATIO), math.log(MOST_RATIO))] * len(start)
         options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": 20, "ftol": 1e-9, "gtol": 1e-9}
         found = minimize(objective, np.zeros(len(start)), jac=True, method="L-BFGS-B", bounds=bounds, options=options)
         stiffness = start * (1 + found.x) if any_sign else start * np.exp(found.x)
@@ -169,27 +169,27 @@ class LoadSpace:
 
     def stretch_bound(self) -> float:
         """Largest delta over all particles: no stiffnesses k >= 0 have a smaller worst error of a stretch [1]."""
-        edges, wanted, proven = self.mesh.edges, self.stretches / self.sizes[:, None], [0.0]
+        edges, target, proven = self.mesh.edges, self.stretches / self.sizes[:, None], [0.0]
         for particle, force in enumerate(self._outside.transpose(1, 2, 0)):
             rows = np.flatnonzero((edges == particle).any(axis=1))
             towards = np.where(edges[rows, 1] == particle, 1.0, -1.0)[:, None] * self.normals[rows]
-            proven.append(delta_of(towards, wanted[rows], force))
+            proven.append(delta_of(towards, target[rows], force))
         return max(proven)
 
 
-def delta_of(normals: np.ndarray, wanted: np.ndarray, force: np.ndarray) -> float:
-    """Delta that one particle proves, or 0, by `normals` of its springs, `wanted` stretches and `force`."""
+def delta_of(normals: np.ndarray, target: np.ndarray, force: np.ndarray) -> float:
+    """Delta that one particle proves, or 0, by `normals` of its springs, `target` stretches and `force`."""
     from scipy.optimize import minimize, nnls  # here: see `springtune.springs`
 
-    rows = np.linalg.svd(np.concatenate([wanted, force]), full_matrices=False)
+    rows = np.linalg.svd(np.concatenate([target, force]), full_matrices=False)
     basis = rows[2][rows[1] > ROUNDING * rows[1][0]].T
-    wanted, force = wanted @ basis, (force @ basis).ravel() / max(np.linalg.norm(force), ROUNDING)
+    target, force = target @ basis, (force @ basis).ravel() / max(np.linalg.norm(force), ROUNDING)
 
     def opposed(unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Virtual stretches, their sizes, and how far they are against the wanted ones; the last unknown is delta."""
+        """Virtual stretches, their sizes, and how far they are against the target ones; the last unknown is delta."""
         stretches = normals @ unknowns[:-1].reshape(2, -1)
         sizes = np.sqrt((stretches**2).sum(axis=1) + LEAST_MOVE**2)
-        return stretches, sizes, -(stretches * wanted).sum(axis=1)
+        return stretches, sizes, -(stretches * target).sum(axis=1)
 
     def margins(unknowns: np.ndarray) -> np.ndarray:
         _, sizes, against = opposed(unknowns)
@@ -198,12 +198,12 @@ def delta_of(normals: np.ndarray, wanted: np.ndarray, force: np.ndarray) -> floa
 
     def slopes(unknowns: np.ndarray) -> np.ndarray:
         stretches, sizes, _ = opposed(unknowns)
-        towards = -wanted - unknowns[-1] * stretches / sizes[:, None]
+        towards = -target - unknowns[-1] * stretches / sizes[:, None]
         of_springs = np.column_stack([(normals[:, :, None] * towards[:, None]).reshape(len(normals), -1), -sizes])
         return np.concatenate([of_springs, [np.append(force, 0.0), np.append(-2 * unknowns[:-1], 0.0)]])
 
     # What the springs, none pushing, leave of the force, or of a sum of 1, is against all of them.
-    pulls = (normals.T[:, None] * wanted.T).reshape(len(force), -1)
+    pulls = (normals.T[:, None] * target.T).reshape(len(force), -1)
     total = np.full((1, len(normals)), 0.0 if force.any() else 1.0)
     start = force - pulls @ nnls(np.concatenate([pulls, total]), np.append(force, 1.0))[0]
     begin = np.append(start / max(np.linalg.norm(start), ROUNDING), 0.0)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, corner_angles
 from ..problem.materials import Material
-from .base import Springs, definition, not_negative
+from .base import Springs, check_not_negative, definition
 
 
 @definition("cross-section", order=95, cells=(3,))
@@ -27,4 +27,4 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     Source: used in lattice programs; no text at hand (derived).
     """
     halves = 0.5 / np.tan(corner_angles(mesh.points, mesh.triangles))
-    return Springs(material.young_modulus * thickness, not_negative(mesh.sum_to_edges({3: halves})))
+    return Springs(material.young_modulus * thickness, check_not_negative(mesh.sum_to_edges({3: halves})))

@@ -40,7 +40,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
 
 @definition("delingette-tensile", order=180, cells=(3,), anisotropic=True)
 def tensile(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
-    """The tensile part of Delingette's springs alone: what is left without coupling.
+    """The tensile part of Delingette's springs alone, without coupling.
 
     Source: Delingette, IEEE TVCG 14(2):329, 2008, and SOFA's code (read).
     """

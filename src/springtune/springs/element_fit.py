@@ -70,23 +70,23 @@ def _fit(here: np.ndarray, pairs: tuple[tuple[int, int], ...], matrices: np.ndar
         parts[:, number, i], parts[:, number, j] = -normal, normal
     springs = parts.reshape(count, len(pairs), -1)
     products = np.einsum("npi,nqi->npq", springs, springs) ** 2
-    wanted = np.einsum("npi,nij,npj->np", springs, matrices, springs)
-    return least_squares(products, wanted)
+    target = np.einsum("npi,nij,npj->np", springs, matrices, springs)
+    return least_squares(products, target)
 
 
-def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the springs k >= 0 of each cell that minimise ``k . products . k - 2 wanted . k``.
+def least_squares(products: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return the springs k >= 0 of each cell that minimise ``k . products . k - 2 target . k``.
 
-    `products` (n_cells, n_springs, n_springs) are of unit springs' effects, `wanted` (n_cells, n_springs) with the aim.
+    `products` (n_cells, n_springs, n_springs) are of unit springs' effects, `target` (n_cells, n_springs) with the aim.
     """
-    pairs = wanted.shape[1]
+    pairs = target.shape[1]
     # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.
-    best, cost = np.zeros(wanted.shape), np.zeros(len(wanted))
-    open_cells = np.arange(len(wanted))
+    best, cost = np.zeros(target.shape), np.zeros(len(target))
+    open_cells = np.arange(len(target))
     for size in range(pairs, 0, -1):
         for chosen in combinations(range(pairs), size):
             places = np.array(chosen)
-            matrices, aims = products[open_cells][:, places[:, None], places], wanted[open_cells][:, places]
+            matrices, aims = products[open_cells][:, places[:, None], places], target[open_cells][:, places]
             found = np.linalg.solve(matrices, aims[..., None])[..., 0]
             trial = -(found * aims).sum(axis=1)
             better = (found >= 0).all(axis=1) & (trial < cost[open_cells])

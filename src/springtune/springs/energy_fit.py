@@ -22,7 +22,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import AnyMaterial
-from .base import Springs, definition, membrane_stiffness, rectangles_only
+from .base import Springs, definition, membrane_stiffness, rectangle_sides
 from .element_fit import least_squares
 
 
@@ -42,7 +42,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
         vectors = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # side i is opposite corner i
         parts[3] = _fitted(vectors, signed_areas(mesh.points, mesh.triangles), compliance)
     if len(mesh.quads):
-        rectangles_only(mesh)
+        rectangle_sides(mesh)
         ends = ((0, 1), (1, 2), (0, 2), (1, 3))
         vectors = np.stack([mesh.points[mesh.quads[:, j]] - mesh.points[mesh.quads[:, i]] for i, j in ends], axis=1)
         first, second, diagonal, other = _fitted(vectors, signed_areas(mesh.points, mesh.quads), compliance).T

@@ -19,7 +19,7 @@ import numpy as np
 from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import lattice
-from .base import Springs, definition, not_negative
+from .base import Springs, check_not_negative, definition
 from .identification import tested_body
 
 
@@ -39,4 +39,4 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     tension = material.young_modulus * thickness / (1 - 1 / 3) / found.reference
     moved = network.expand(network.rest_factor.solve(network.reduce(tension * outline_forces(mesh, np.eye(2)))))
     growth = np.einsum("ij,ij->i", network.rest_vectors, network.end_differences(moved)) / network.rest_lengths**2
-    return Springs(found.reference, not_negative(found.relative * growth), evaluations=1)
+    return Springs(found.reference, check_not_negative(found.relative * growth), evaluations=1)

@@ -1,6 +1,6 @@
-"""Stiffness of each spring from wanted displacements: the misfit that searches minimise.
+"""Stiffness of each spring from target displacements: the misfit that searches minimise.
 
-A case is a load and its wanted displacements. The misfit of a network over all particles is ::
+A case is a load and its target displacements. The misfit of a network over all particles is ::
 
     J = 1/2 sum over cases |u - u*|^2 / |u*|^2
 
@@ -19,12 +19,12 @@ from ..problem.materials import AnyMaterial, Material
 from . import energy_fit, lattice
 from .base import DefinitionError, Springs, membrane_stiffness
 
-SPAN = 10.0  # largest factor between a spring and where its search starts [1]
+MOST_RATIO = 10.0  # largest factor between a spring and where its search starts [1]
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A load [N] and its wanted displacements [m], with `held` directions; all arrays are (n_points, 2)."""
+    """A load [N] and its target displacements [m], with `held` directions; all arrays are (n_points, 2)."""
 
     held: np.ndarray
     forces: np.ndarray
@@ -68,7 +68,7 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
 
 
 def _first_least(values: np.ndarray) -> int:
-    """Number of the least value; of equal ones the first, whatever rounding says."""
+    """Number of the least value; the first one of those that are equal up to rounding."""
     return int(np.argmax(values <= values.min() + 1e-9 * np.ptp(values)))
 
 
@@ -107,7 +107,7 @@ class Misfit:
     @property
     def bounds(self) -> list[tuple[float, float]]:
         """Least and largest logarithm of each spring."""
-        return [(-math.log(SPAN), math.log(SPAN))] * len(self.start)
+        return [(-math.log(MOST_RATIO), math.log(MOST_RATIO))] * len(self.start)
 
     def springs(self, logarithms: np.ndarray) -> Springs:
         """Springs of logarithms that a search found."""
@@ -132,10 +132,10 @@ class Misfit:
             except SingularError:
                 return np.inf, slope
             loads = np.stack([network.reduce(case.forces) for case in cases], axis=1) / self.reference
-            wanted = np.stack([network.reduce(case.displacements) for case in cases], axis=1)
+            target = np.stack([network.reduce(case.displacements) for case in cases], axis=1)
             weights = 1 / np.array([np.sum(case.displacements**2) for case in cases])
             found = factor.solve(loads)
-            miss = found - wanted
+            miss = found - target
             total += 0.5 * float((weights * (miss**2).sum(axis=0)).sum())
             if gradient:
                 adjoint = factor.solve(miss * weights)

@@ -21,7 +21,7 @@ from ..mesh.cells import Mesh
 from ..problem.loads import LOADS
 from ..problem.materials import Material
 from ..problem.shapes import Beam
-from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
+from .base import Springs, check_not_negative, definition, from_rectangles, rectangle_sides
 
 COEFFICIENT = math.sqrt(3) / 2  # stiffness of an edge inside over E t [1]
 
@@ -39,14 +39,14 @@ def half_weight(mesh: Mesh) -> np.ndarray:
     """Stiffness of each edge over that of an edge inside an equilateral lattice [1], shape (n_edges,)."""
     if not len(mesh.quads):
         return mesh.sum_to_edges({3: np.full((len(mesh.triangles), 3), 0.5)})
-    along, across = rectangles_only(mesh)
+    along, across = rectangle_sides(mesh)
     scale = 3 / (16 * COEFFICIENT * along * across)
-    first, second = (not_negative(scale * (3 * b**2 - a**2)) for a, b in ((along, across), (across, along)))
+    first, second = (check_not_negative(scale * (3 * b**2 - a**2)) for a, b in ((along, across), (across, along)))
     return from_rectangles(mesh, first, second, scale * (along**2 + across**2))
 
 
 def uniform(mesh: Mesh) -> np.ndarray:
-    """Multiples of a uniform stiffness [1], shape (n_edges,): ones."""
+    """Relative stiffnesses of uniform springs: ones, shape (n_edges,)."""
     return np.ones(len(mesh.edges))
 
 

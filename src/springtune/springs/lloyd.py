@@ -15,7 +15,7 @@ import numpy as np
 from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import lattice
-from .base import DefinitionError, Springs, definition, from_rectangles, rectangles_only
+from .base import DefinitionError, Springs, definition, from_rectangles, rectangle_sides
 
 SIDE, DIAGONAL = 5 / 16, 7 / 16  # stiffness that a square gives its sides and diagonals over E t [1]
 
@@ -30,7 +30,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """
     if not len(mesh.quads):
         return lattice.springs(mesh, material, thickness)
-    along, across = rectangles_only(mesh)
+    along, across = rectangle_sides(mesh)
     if (np.abs(along / across - 1) > 0.02).any():
         found = f"needs squares and the mesh has rectangles of {1e3 * along[0]:.4g} x {1e3 * across[0]:.4g} mm"
         raise DefinitionError(f"{found}; choose a mesh size that divides both sides of the beam")

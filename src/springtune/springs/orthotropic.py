@@ -26,7 +26,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, rotated
-from .base import DefinitionError, Springs, definition, from_rectangles, membrane_stiffness, rectangles_only
+from .base import DefinitionError, Springs, definition, from_rectangles, membrane_stiffness, rectangle_sides
 
 COUPLING = 1e-9  # largest C16 and C26 along the sides of a rectangle, over the largest constant, that are rounding [1]
 
@@ -43,7 +43,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 
-    along, across = rectangles_only(mesh)
+    along, across = rectangle_sides(mesh)
     first = mesh.points[mesh.quads[:, 1]] - mesh.points[mesh.quads[:, 0]]
     reference = membrane_stiffness(material, 1.0)
     sides, others, diagonals, moduli = (np.empty(len(along)) for _ in range(4))

@@ -92,7 +92,7 @@ def _law(energy: Any) -> tuple[object, ...]:
 
 
 def _joined(mesh: Mesh, parts: list[tuple[Any, np.ndarray, float]]) -> Any:
-    """One energy of those of several parts: each with its cells in the whole mesh, and the factor on its moduli."""
+    """Join the energies of several parts: each with its cells in the whole mesh, and the factor on its moduli."""
     first = parts[0][0]
     if any(len(energy.corners) != len(where) for energy, where, _ in parts):
         raise DefinitionError("has an energy of some cells alone; derive it for one material")

@@ -1,7 +1,7 @@
 """One scalar from one patch test of the same mesh: its mean Young's modulus is exact, no reference solution.
 
 ``k_e = s k_e,0`` with ``s = E / E_eff``, where E_eff is that of the network of `springtune.springs.lattice` (or of
-`springtune.springs.area`): one factorization of the mesh, scaled out of all later ones.
+`springtune.springs.area`): this costs one factorization of the mesh.
 
 A strip between straight faces, such as a beam, is tested between rollers on its ends: E along x. Any other mesh is
 tested by three affine displacements of its whole outline, rims of holes included, under which a continuum of any

@@ -48,12 +48,12 @@ TEST_DEGREE = 4  # degree of the displacements of the tests, one above that of t
 
 TESTS = 4 * TEST_DEGREE - 1  # polynomial solutions up to that degree that are no rigid motion
 
-LEAST_TOLD = 1e-12  # energy of a test over the largest one's below which it is rounding, as in very slender sheets [1]
+LEAST_ENERGY_SHARE = 1e-12  # energy of a test over the largest one's; less is rounding, as in very slender sheets [1]
 
 CHANGE_WEIGHT = 0.1
 """lambda: weight of the mean squared logarithm of a spring's change against the squared misfit of the tests [1]."""
 
-STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.3
+STEPS, LARGEST_STEP, LAST_STEP = 4, 1.0, 0.3
 """Most Gauss-Newton steps; largest change of a logarithm in one, and that below which it is the last [1]."""
 
 
@@ -89,7 +89,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         change = slope @ np.linalg.solve(normal, misfit + slope.T @ logarithms) - logarithms
         largest = np.abs(change).max()
         logarithms += change * min(1.0, LARGEST_STEP / largest)
-        if largest < ENOUGH:
+        if largest < LAST_STEP:
             break
     return Springs(material.young_modulus * thickness, start * np.exp(logarithms), evaluations=evaluations)
 
@@ -123,8 +123,8 @@ def polynomial_tests(
         axes = [np.bincount(particles, axis, len(places)) for axis in (pulls.real, pulls.imag)]
         forces.append(np.stack(axes, axis=1))
     energies, mixtures = np.linalg.eigh(0.5 * (work + work.T))
-    told = energies > LEAST_TOLD * energies[-1]
-    mixtures = mixtures[:, told] / np.sqrt(energies[told])
+    significant = energies > LEAST_ENERGY_SHARE * energies[-1]
+    mixtures = mixtures[:, significant] / np.sqrt(energies[significant])
     moved = np.stack([inside.real, inside.imag], axis=2)
     return np.einsum("ab,anx->bnx", mixtures, np.array(forces)), np.einsum("ab,anx->bnx", mixtures, moved)
 

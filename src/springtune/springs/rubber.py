@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from ..problem.materials import CHECKED_STRETCHES, TensileTest, TestDataError, fit, read_test
-from ..problem.quantities import whole
+from ..problem.quantities import whole_number
 
 LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""
 
-FLAT = 2.0  # stretch at which a lattice of equilateral triangles, pulled along a row, lies flat
+FLAT_STRETCH = 2.0  # stretch at which a lattice of equilateral triangles, pulled along a row, lies flat
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class SpringLaw:
     """One law for all springs of an equilateral lattice, and its response in the three tests.
 
     A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per cross-section of its rows, p of `LAW_POWERS`, with the
-    `coefficients` a_p [Pa]; `largest` is the largest stretch in the fitted data [1], below `FLAT`.
+    `coefficients` a_p [Pa]; `largest` is the largest stretch in the fitted data [1], below `FLAT_STRETCH`.
     """
 
     coefficients: tuple[float, ...]
@@ -35,10 +35,10 @@ class SpringLaw:
     def fitted(cls, test: TensileTest | str | Path, terms: int = 3) -> "SpringLaw":
         """Law fitted to a uniaxial test along a row, as far as the lattice does not lie flat."""
         test = read_test(test)
-        whole(terms, "terms", len(LAW_POWERS))
-        below = test.stretch < FLAT
+        whole_number(terms, "terms", len(LAW_POWERS))
+        below = test.stretch < FLAT_STRETCH
         if below.sum() <= terms:
-            why = f"{terms} terms need more than {below.sum()} points below a stretch of {FLAT:g}"
+            why = f"{terms} terms need more than {below.sum()} points below a stretch of {FLAT_STRETCH:g}"
             raise TestDataError(f"{test.name}: {why}, where the lattice lies flat; give fewer terms")
         test = TensileTest(test.stretch[below], test.stress[below], test.name)
         q = test.stretch
@@ -58,5 +58,5 @@ class SpringLaw:
         q = np.asarray(stretch, float)
         row, oblique = self.pull(q), np.sqrt((q**2 + 3) / 4)
         if test == "uniaxial":  # the oblique springs carry nothing
-            return np.where(q < FLAT, row, np.nan)
+            return np.where(q < FLAT_STRETCH, row, np.nan)
         return row * 1.5 if test == "equibiaxial" else row + q * self.pull(oblique) / (2 * oblique)

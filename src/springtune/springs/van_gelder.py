@@ -21,7 +21,7 @@ triangles.
 
 from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
-from .base import Springs, definition, not_negative
+from .base import Springs, check_not_negative, definition
 
 
 @definition("van-gelder", order=80, cells=(3,))
@@ -50,4 +50,4 @@ def general(mesh: Mesh, material: Material, thickness: float) -> Springs:
     nu = material.poisson_ratio
     half_cotangents = (squares.sum(axis=1, keepdims=True) - 2 * squares) / (8 * areas)
     parts = areas / squares / (1 + nu) + nu / (1 - nu**2) * half_cotangents
-    return Springs(material.young_modulus * thickness, not_negative(mesh.sum_to_edges({3: parts})))
+    return Springs(material.young_modulus * thickness, check_not_negative(mesh.sum_to_edges({3: parts})))

@@ -13,12 +13,12 @@ from .output import reading
 from .runs.keys import input_files
 from .runs.source import checksum
 
-SUMS, INSTALLED, README = "SHA256SUMS", "versions.json", "README.md"
+CHECKSUMS_FILE, VERSIONS_FILE, README = "SHA256SUMS", "versions.json", "README.md"
 
 PRODUCTS = ("dataset.nc", "index.html", "summary.txt", "figures/*", "tables/*")
 """Files of `results/<study>` that are packed; what the stages stored is not, since the study makes it again."""
 
-AGAIN = """# {title}
+README_TEXT = """# {title}
 
 A study by springtune {version}. `dataset.nc` has all results, `index.html` shows them.
 
@@ -45,25 +45,25 @@ def pack(study: Study, folder: Path, target: Path) -> list[str]:
     files = {path.relative_to(folder).as_posix(): path for name in PRODUCTS for path in sorted(folder.glob(name))}
     files |= _inputs(study)
     texts = {
-        README: AGAIN.format(title=about["title"], version=about["springtune_version"], study=study.path.name),
-        INSTALLED: f"{versions}\n",
+        README: README_TEXT.format(title=about["title"], version=about["springtune_version"], study=study.path.name),
+        VERSIONS_FILE: f"{versions}\n",
     }
     with tempfile.TemporaryDirectory() as made:
         for name, text in texts.items():
             files[name] = Path(made, name)
             files[name].write_text(text, encoding="utf-8")
-        sums = Path(made, SUMS)
+        sums = Path(made, CHECKSUMS_FILE)
         sums.write_text("".join(f"{checksum(path)}  {name}\n" for name, path in files.items()), encoding="utf-8")
         crate = ROCrate()
         crate.name, crate.description = about["title"], f"Study by springtune {about['springtune_version']}"
         crate.datePublished = about["created"]
-        for name, path in (*files.items(), (SUMS, sums)):
+        for name, path in (*files.items(), (CHECKSUMS_FILE, sums)):
             crate.add_file(path, name)
         written = Path(made, "archive.zip")
         crate.write_zip(written)
         with replacing(target) as unfinished:
             shutil.copyfile(written, unfinished)
-    return [*files, SUMS]
+    return [*files, CHECKSUMS_FILE]
 
 
 def _inputs(study: Study) -> Mapping[str, Path]:

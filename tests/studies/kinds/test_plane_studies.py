@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from springtune.studies.kinds import collect
-from springtune.studies.output.dataset import like_with_like
+from springtune.studies.output.dataset import against_own_laws
 from springtune.studies.runs import keys
 
 import campaigns
@@ -32,7 +32,7 @@ def test_a_material_in_plane_strain_is_compared_in_its_plane(gathered):
     assert root.material_plane.values.tolist() == ["strain", "stress", "strain"]
     np.testing.assert_array_equal(groups["/moduli"].poisson_ratio, [0.3, 1 / 3, 0.45 / 0.55])
     assert abs(groups["/moduli"].young_modulus_error.sel(definition="delingette")).max() < 1e-9
-    own = like_with_like(root, finite).reference_displacement.sel(kinematics="nonlinear").squeeze()
+    own = against_own_laws(root, finite).reference_displacement.sel(kinematics="nonlinear").squeeze()
     np.testing.assert_allclose(own, root.reference_displacement.squeeze(), rtol=1e-3)
     asked = finite.sel(reference="neo-hooke-plane-stress", material="rock")
     assert "is in plane strain: its reference is 'neo-hooke-plane-strain'" in asked.reference_message.item()

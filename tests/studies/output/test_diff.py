@@ -138,7 +138,7 @@ class TestChanges:
     def test_groups_and_variables_of_one_side(self):
         other = xr.DataTree.from_dict({"/": made().to_dataset().drop_vars("stiffness"), "/block": xr.Dataset()})
         found = compare(made(), other)
-        assert found.alone == (["/sensitivity"], ["/block"]) and found.groups[0].variables == (["stiffness"], [])
+        assert found.only_groups == (["/sensitivity"], ["/block"]) and found.groups[0].variables == (["stiffness"], [])
         assert not compare(made(), other, groups=["/"], ignored=["stiff*"]).different
 
 

@@ -110,7 +110,7 @@ class TestEnding:
         for name in names:
             count = len(made[name].results)
             mark_done(made, name, count, since + (50 if name.startswith(new) else -50))
-        return summary.ending(study, made, since), made["collect"].folder, since
+        return summary.success_report(study, made, since), made["collect"].folder, since
 
     def test_says_what_is_new_and_where_it_is(self, planned):
         folder = planned[1]["collect"].folder
@@ -136,11 +136,11 @@ class TestEnding:
         made[names[-1]].record.unlink()
         (folder / "logs").mkdir()
         (folder / "logs" / f"{names[-1]}.log").write_text("why")
-        text = summary.broken(study, made, since)
+        text = summary.failure_report(study, made, since)
         assert "two is not complete" in text and f"logs/{names[-1]}.log" in text and text.count(".log") == 1
         (folder / "logs/collect.log").write_text("why, too")
-        assert "logs/collect.log" in summary.broken(study, made, since)
-        besides = summary.beside(study, made, since)
+        assert "logs/collect.log" in summary.failure_report(study, made, since)
+        besides = summary.other_study_report(study, made, since)
         assert "new in two: " in besides and f"not complete: {names[-1]}" in besides and besides.count(".log") == 2
 
 

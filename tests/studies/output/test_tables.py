@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.problem.compare import assured
+from springtune.problem.compare import largest_finer_errors
 from springtune.studies.kinds.benchmark import figures as benchmark
 from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
 from springtune.studies.kinds.bodies.collect import ROOT
@@ -93,7 +93,7 @@ def test_the_tables_of_the_benchmark_have_numbers_and_holes():
 
 @cases
 def test_an_error_counts_only_with_all_finer_ones(errors, wanted):
-    assert assured(np.array([errors]))[0] == pytest.approx(wanted, nan_ok=True)
+    assert largest_finer_errors(np.array([errors]))[0] == pytest.approx(wanted, nan_ok=True)
 
 
 # -- the experiments on stability --------------------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
     compression, traction = found[:2], found[2:]
     place = ["alu-bar", "4", "10000", "0.003420"]
     # The definition with the smaller error stands first.
-    assert traction[0] == [*place, "nonlinear", "", "", "0.003500", "+2.34"] and "Empty: not asked for." in html
+    assert traction[0] == [*place, "nonlinear", "", "", "0.003500", "+2.34"] and "Empty: not requested." in html
     assert traction[1] == [*place, "linear", "0.003400", "−0.60", "0.003500", "+2.34"]
     assert compression[0][5:] == ["0.003500u", "+2.34", "", ""]
     assert compression[1][-2:] == ["not converged", ""]

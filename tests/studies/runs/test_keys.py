@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import springtune as st
-from springtune.studies.kinds.bodies.kind import NOT_OF_BEAMS, REFERENCES_OF_SHAPES
+from springtune.studies.kinds.bodies.kind import REFERENCES_OF_SHAPES, SHAPE_MODULES
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
@@ -45,7 +45,7 @@ def test_no_module_imports_a_package_that_brings_in_others():
 
 @pytest.mark.parametrize("row", TABLES["closures"].values(), ids=TABLES["closures"])
 def test_a_module_counts_with_what_it_imports_and_with_nothing_else(row):
-    known = {"beams": NOT_OF_BEAMS, "references of beams": REFERENCES_OF_SHAPES}
+    known = {"beams": SHAPE_MODULES, "references of beams": REFERENCES_OF_SHAPES}
     without = known.get(str(row.get("without")), tuple(row.get("without", ())))
     files = keys.closure(row["module"], without=without).files
     found = {path.relative_to(keys.PACKAGE).as_posix() for path in files}
@@ -68,7 +68,7 @@ WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "typst", "jin
 
 @pytest.mark.parametrize("stage", stages(), ids=lambda stage: stage.name)
 def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
-    assert not keys.closure(stage.module).packages & (WRITING | keys.CARRIERS)
+    assert not keys.closure(stage.module).packages & (WRITING | keys.CARRIER_PACKAGES)
 
 
 def _keys():
@@ -78,7 +78,7 @@ def _keys():
     found["unit"] = keys.stage_key("studies.kinds.bodies.reference", without=of_beams)
     found["samples.interpolate"] = keys.stage_key("studies.kinds.samples.interpolate", without=of_beams)
     found["box"] = keys.stage_key("studies.kinds.bodies.mesh", without=("studies.kinds.bodies.task_values",))
-    found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=NOT_OF_BEAMS)
+    found["beam"] = keys.stage_key("studies.kinds.bodies.solve", without=SHAPE_MODULES)
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
     return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}
 

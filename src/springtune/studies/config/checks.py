@@ -8,7 +8,7 @@ from typing import Any
 
 from springtune.mesh.cells import MESH_TYPES, too_many
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import INCOMPRESSIBLE
+from springtune.problem.materials import INCOMPRESSIBLE_REASON
 from springtune.problem.quantities import MOST_SCENES, MOST_SCENES_VARIABLE, nearest
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
@@ -28,11 +28,11 @@ MOST_CELLS = 2_500_000  # limit of label combinations over all dimensions, reque
 
 MOST_CURVE_POINTS = 10_000_000
 
-FEWER = "give shorter lists, or split the study into several"
+FEWER_REMEDY = "give shorter lists, or split the study into several"
 
-MORE_SCENES = f"or allow more by {MOST_SCENES_VARIABLE} in the environment"
+MORE_SCENES_REMEDY = f"or allow more by {MOST_SCENES_VARIABLE} in the environment"
 
-ANOTHER = "take another definition, or give each a grid of its own"
+DEFINITION_REMEDY = "take another definition, or give each a grid of its own"
 
 
 # -- names -------------------------------------------------------------------------------------------------------------
@@ -62,7 +62,7 @@ def check_density(config: StudyConfig, name: str, path: Place, problems: Problem
 def check_scene(
     problems: Problems, path: Place, scene: Any, config: StudyConfig, able: Callable[[str], bool], why: str
 ) -> None:
-    """Check that the material of a scene is isotropic with a density, and that its load is able."""
+    """Check that the material of a scene is isotropic with a density, and that its load is supported."""
     check_beam_material(problems, (*path, "material"), scene.material, config)
     check_density(config, scene.material, (*path, "material"), problems)
     if not able(scene.load):
@@ -70,7 +70,7 @@ def check_scene(
 
 
 def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
-    """Rows of stated stiffnesses, if any."""
+    """Rows of stated stiffnesses of a study; empty without the definition `paper`."""
     return config.definitions.paper.stiffness if config.definitions.paper else []
 
 
@@ -85,7 +85,7 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
                     why = f"material '{material}' has a uniaxial_test, which says its moduli"
                     problems.add((*path, key), f"{why}; take it out of this grid, or remove the key")
             if config.materials[material].plane == "strain" and 0.5 in (grid.poisson_ratio or ()):
-                what = f"material '{material}' is in plane strain, and this ratio is {INCOMPRESSIBLE}"
+                what = f"material '{material}' is in plane strain, and this ratio is {INCOMPRESSIBLE_REASON}"
                 problems.add((*path, "poisson_ratio"), what)
         if isinstance(grid.force, dict):
             for owner in dict.fromkeys(getattr(grid, grid.force_owner)):
@@ -120,7 +120,7 @@ def check_count(
     lists: Mapping[str, Collection[Any]],
     most: int,
     what: str = "combinations",
-    remedy: str = FEWER,
+    remedy: str = FEWER_REMEDY,
 ) -> int:
     """Check the product of the lengths of lists, and return it."""
     count = math.prod(map(len, lists.values()))
@@ -140,7 +140,7 @@ def check_scenes(config: StudyConfig, problems: Problems) -> None:
     left, what = most_scenes(problems), "scenes"
     for name, grid in config.grids.items():
         lists = {" and ".join(group): rows for group, rows in factors(grid)}
-        left -= check_count(problems, ("grids", name), lists, left, what, f"{FEWER}, {MORE_SCENES}")
+        left -= check_count(problems, ("grids", name), lists, left, what, f"{FEWER_REMEDY}, {MORE_SCENES_REMEDY}")
         what = "scenes beside those of the grids above"
     problems.stop()
     labels = [name for name in GRID_PARAMETERS if name not in ("force", "pressure")]
@@ -151,7 +151,7 @@ def check_scenes(config: StudyConfig, problems: Problems) -> None:
 def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool, problems: Problems) -> None:
     """Check the labels of the dataset, which has a cell for each combination of them."""
     further = "parameters that change together are better drawn under 'samples'"
-    check_count(problems, ("grids",), lists, MOST_CELLS, "cells of all labels together", f"{FEWER}; {further}")
+    check_count(problems, ("grids",), lists, MOST_CELLS, "cells of all labels together", f"{FEWER_REMEDY}; {further}")
     if curves:
         of_curves = {name: one for name, one in lists.items() if name not in ("definition", "stiffness_scale")}
         of_curves["points"] = set(range(config.sensitivity.points))
@@ -167,7 +167,7 @@ def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool
 
 
 def in_mm(length: float) -> str:
-    """Length as messages show it."""
+    """Return a length [m] as text in mm."""
     return f"{1e3 * length:g} mm"
 
 
@@ -193,23 +193,23 @@ def check_meshes(config: StudyConfig, grids: Iterable[Grid], problems: Problems)
 # -- definitions -------------------------------------------------------------------------------------------------------
 
 
-def check_able(
+def check_fit(
     problems: Problems, path: Place, names: Names, mesh_types: Names = (), loads: Names = (), derived: bool = True
 ) -> None:
     """Check that definitions fit mesh types and loads, and, if `derived`, need no reference and no stated stiffness."""
     for name in names:
         one = DEFINITIONS[name]
         if derived and one.needs:
-            problems.add(path, f"'{name}' needs a reference or a stated stiffness, which grids alone have; {ANOTHER}")
+            problems.add(path, f"'{name}' needs a reference or a stated stiffness of a grid; {DEFINITION_REMEDY}")
         for mesh_type in mesh_types:
             made = MESH_TYPES.get(mesh_type)
             if made and made.corners not in one.cells:
                 needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
-                problems.add(path, f"'{name}' needs {needs} and mesh type '{mesh_type}' has {has}; {ANOTHER}")
+                problems.add(path, f"'{name}' needs {needs} and mesh type '{mesh_type}' has {has}; {DEFINITION_REMEDY}")
         for load in loads if one.uniaxial else ():
             if not LOADS[load].kind.uniaxial:
                 kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
-                problems.add(path, f"'{name}' is for {kinds} and load '{load}' is neither; {ANOTHER}")
+                problems.add(path, f"'{name}' is for {kinds} and load '{load}' is neither; {DEFINITION_REMEDY}")
 
 
 def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Problems) -> None:
@@ -218,9 +218,9 @@ def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Prob
     for grid in grids:
         path = ("grids", grid.name, "definition")
         for name, mesh_type, load in dict.fromkeys((s.definition, s.mesh.mesh_type, s.load) for s in grid.scenes):
-            check_able(problems, path, [name], [mesh_type], [load], derived=False)
+            check_fit(problems, path, [name], [mesh_type], [load], derived=False)
             if name == "calibrated" and not config.definitions.calibrated:
-                problems.add(path, "'calibrated' needs to know on what; add definitions.calibrated, a beam and a load")
+                problems.add(path, "'calibrated' needs a beam and a load to calibrate on; add definitions.calibrated")
         paper = (scene for scene in grid.scenes if scene.definition == "paper")
         sheets = dict.fromkeys((scene.mesh.mesh_type, scene.material, scene.mesh.beam.thickness) for scene in paper)
         for mesh_type, material, thickness in sheets:
@@ -233,5 +233,5 @@ def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Prob
             elif not expected / PLAUSIBLE_FACTOR <= value <= expected * PLAUSIBLE_FACTOR:
                 place, written = part_of(problems.content, ("definitions", "paper", "stiffness", number, "value"))
                 sheet = f"{material.name}, {1e3 * thickness:g} mm thick and of {material.young_modulus:.4g} Pa"
-                why = f"{show(written)} cannot be meant: sqrt(3)/2 E t of {sheet}, is {expected:.4g} N/m"
+                why = f"{show(written)} is implausible: sqrt(3)/2 E t of {sheet}, is {expected:.4g} N/m"
                 problems.add(place, f"{why}; give a stiffness near that, in N/m")

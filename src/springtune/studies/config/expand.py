@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
-from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
+from springtune.problem.materials import AnyMaterial, Material, Rubber, check_isotropic
 from springtune.problem.quantities import SWEPT, nearest
 from springtune.problem.shapes import Beam
 from springtune.registry import NAME, NAME_RULE
@@ -22,7 +22,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from . import checks
 from .fields import FILES, RANGE_DIGITS, BeamName, Load, MaterialName, MeshType, Section
-from .messages import Key, Problems, StudyError, control_character_fault, read_study, show, validated
+from .messages import Key, Problems, StudyError, control_character_fault, read_study, show, validate
 from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, StudyKind
 from .sections import GRID_PARAMETERS, StudyConfig, combinations, study_model
 
@@ -43,11 +43,11 @@ def load(path: str | Path, kinds: tuple[StudyKind, ...]) -> Study:
     # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
     given = content.items() if isinstance(content, dict) else ()
     sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: files}
-    config = validated(study_model(kinds), content, problems, context=sections)
+    config = validate(study_model(kinds), content, problems, context=sections)
     for check in (checks.check_names, checks.check_scenes):
         check(config, problems)
         problems.stop()
-    for kind in filter(lambda kind: kind.wanted(config), kinds):
+    for kind in filter(lambda kind: kind.requested_by(config), kinds):
         kind.check(config, problems)
     problems.stop()
     about = {"name": path.stem, "path": path, "text": text, "files": tuple(path.parent / name for name in files)}
@@ -120,7 +120,7 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
 
     @cache
     def make_material(name: str, young_modulus: float | None, poisson_ratio: float | None) -> Material:
-        found = only_isotropic(bodies.materials[name], "put the sheet under 'shapes'")
+        found = check_isotropic(bodies.materials[name], "put the sheet under 'shapes'")
         if isinstance(found, Rubber):  # it keeps the moduli of its law; `check_names` refuses others
             return found
         ratio = found.poisson_ratio if poisson_ratio is None else poisson_ratio
@@ -216,7 +216,7 @@ def build(config: StudyConfig, kinds: Sequence[StudyKind], problems: Problems, a
         used[name] = {getattr(one, name) for one in scenes} if own else {one[name] for one in found if name in one}
     checks.check_cells(config, used, bool(curves), problems)
     problems.stop()
-    parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
+    parts = {kind.name: kind.expand(config, bodies) if kind.requested_by(config) else () for kind in kinds}
     if config.printed and names:
         why = f"printed cells know no {' or '.join(names)}, which grids sweep"
         problems.stop_at(("printed",), f"{why}; give the sweep a study of its own, or remove the key")
@@ -343,7 +343,7 @@ def read_printed(path: Path, config: StudyConfig, problems: Problems) -> tuple[P
     cells: dict[tuple[Any, ...], tuple[int, PrintedCell]] = {}
     known = {"mesh_files": config.mesh_files or (), "beams": None, "materials": None}  # print may have others
     for line, row in rows:
-        cell = validated(PrintedCell, dict(zip(head, row)), own, line, known)
+        cell = validate(PrintedCell, dict(zip(head, row)), own, line, known)
         first, _ = cells.setdefault((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load), (line, cell))
         if first != line:
             own.add((), f"is the cell of line {first} again; remove one", line)

@@ -27,11 +27,11 @@ from springtune import units
 from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import MOST_TERMS
-from springtune.problem.quantities import PLANES, beyond, nearest
+from springtune.problem.quantities import PLANES, nearest, out_of_range
 from springtune.registry import NAME, NAME_RULE
 from springtune.springs.base import DEFINITIONS
 
-from .messages import OR_RANGE, explained, refuse, show
+from .messages import OR_RANGE, explain_errors, refuse, show
 from .model import FURTHER_REFERENCES
 
 MOST_POINTS = 10_001
@@ -53,14 +53,14 @@ class Section(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _read(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Read a section without its empty keys; errors say what is wrong."""
+        """Read a section without its empty keys; its errors have a fault and a remedy."""
         keys = {field.alias or name: field for name, field in cls.model_fields.items()}
         if isinstance(value, dict):
             value = {key: content for key, content in value.items() if content is not None or key not in keys}
         try:
             return handler(value)
         except ValidationError as error:
-            raise explained(keys, value, error) from None
+            raise explain_errors(keys, value, error) from None
 
 
 # -- single values -----------------------------------------------------------------------------------------------------
@@ -79,8 +79,8 @@ def read_quantity(value: object, dimension: str, signed: bool = False) -> float:
         raise refuse(str(error)) from None
     if not number > 0 and not signed:
         raise refuse(f"{show(value)} is not above zero; give a size above zero, such as '{about.example}'")
-    if not abs(number) < LARGEST_QUANTITY if signed else beyond(number, dimension):
-        raise refuse(f"{show(value)} is beyond all measure; give {about.words}")
+    if not abs(number) < LARGEST_QUANTITY if signed else out_of_range(number, dimension):
+        raise refuse(f"{show(value)} is far out of range; give {about.words}")
     return number + 0.0
 
 

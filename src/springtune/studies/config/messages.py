@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from springtune.problem.quantities import nearest
-from springtune.safe_io import UNSEEN, BeyondSize, clipped, read, shown
+from springtune.safe_io import UNSEEN_PATTERN, BeyondSize, clipped, read, shown
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -24,7 +24,7 @@ SHOWN_PROBLEMS = 5  # problems that one message lists; the rest are counted
 
 
 class StudyError(ValueError):
-    """A study that cannot be run; the message names file, line, key, value and remedy.
+    """A study cannot be run; the message names file, line, key, value and remedy.
 
     Examples
     --------
@@ -125,14 +125,14 @@ def _item(annotation: Any) -> Any:
     return _item(parts[0]) if origin in (Annotated, Union, UnionType) else parts[-1]
 
 
-WHY = {"int_parsing": "is not a whole number"}
-WHY |= dict.fromkeys(("float_parsing", "decimal_parsing"), "is not a number")
-WHY |= dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal", "finite_number"), "is out of range")
+REASONS = {"int_parsing": "is not a whole number"}
+REASONS |= dict.fromkeys(("float_parsing", "decimal_parsing"), "is not a number")
+REASONS |= dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal", "finite_number"), "is out of range")
 """Fault of a value, by the type of pydantic's error."""
 
 
-def explained(keys: Mapping[str, FieldInfo], content: Any, error: ValidationError) -> ValidationError:
-    """Give the errors of a section messages with value, fault and remedy; those of sections inside have theirs."""
+def explain_errors(keys: Mapping[str, FieldInfo], content: Any, error: ValidationError) -> ValidationError:
+    """Give the errors of a section messages with value, fault and remedy; inner sections have explained theirs."""
     errors: list[Any] = error.errors(include_url=False)
     found: list[Any] = []
     kinds = [details["type"] for details in errors]
@@ -152,13 +152,13 @@ def explained(keys: Mapping[str, FieldInfo], content: Any, error: ValidationErro
             one = refuse(f"{len(value)} values; give at most {details['ctx']['max_length']}, or split the study")
         else:
             given = words(reduce(lambda inside, _: _item(inside), path[1:], keys[place[0]]))
-            why = WHY.get(kind, "does not fit") if isinstance(value, str) else f"instead of {given}"
+            why = REASONS.get(kind, "does not fit") if isinstance(value, str) else f"instead of {given}"
             one = refuse(f"{show(value)} {why}; give {given}")
         found.append({"type": one, "loc": place, "input": value})
     return ValidationError.from_exception_data("section", found)
 
 
-def validated(
+def validate(
     model: type[Model], content: Any, problems: Problems, line: int = 0, context: Mapping[str, Any] | None = None
 ) -> Model:
     """Return the model of a content; each error of pydantic is a problem with place, value and remedy."""
@@ -187,7 +187,7 @@ def show(value: object) -> str:
 
 def control_character_fault(text: str) -> str:
     """Return why a text is not one line of visible characters, or an empty string."""
-    found = UNSEEN.search(text)
+    found = UNSEEN_PATTERN.search(text)
     return f"{show(text)} has '{shown(found[0])}'; write one line of characters that can be seen" if found else ""
 
 

@@ -170,11 +170,11 @@ class Study:
         return self.parts["bodies"]["shapes"] if self.parts["bodies"] else None
 
     def material(self, name: str) -> AnyMaterial:
-        """A material that the study declares."""
+        """Return a material that the study declares, by name."""
         return choose(self.materials, name, "material")
 
     def shape(self, name: str) -> Shape:
-        """A shape that the study declares, with its loads.
+        """Return a shape that the study declares, with its loads, by name.
 
         >>> import springtune as st
         >>> study = st.load_study("config/shapes.yaml")
@@ -233,9 +233,9 @@ def shown(scenes: Iterable[SceneSpec], swept: Iterable[str]) -> frozenset[SceneS
 
 _PACKAGES = Path(__file__).parents[1] / "kinds"
 
-_FIRST = ("bodies", "moduli", "laying", "stability", "benchmark", "samples")
+_FIRST_KINDS = ("bodies", "moduli", "laying", "stability", "benchmark", "samples")
 
-KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
+KINDS = _FIRST_KINDS + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST_KINDS}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
 
 VIEWS = "views.yaml"  # file of a study kind with its views on the page to browse
@@ -300,7 +300,7 @@ class Stage:
     tasks: Callable[[Study], Iterable[Any]]  # see `springtune.studies.runs.plan.Task`
     folder: str = ""  # of its files, within the study's folder; by default its name
     like: str = ""  # stage whose bundles it shares
-    alone: bool = False  # whether a job has tasks of one name and the whole machine, to measure seconds
+    timed: bool = False  # whether a job has tasks of one name and the whole machine, to measure seconds
     endings: tuple[str, ...] = (".h5",)  # of the files of a result
     unkeyed: tuple[str, ...] | None = None  # the only values of its tasks that are not in their keys, if known
 
@@ -319,7 +319,7 @@ class StudyKind:
     name: str  # of its package, and of its part of a study
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)  # keys it adds: type and pydantic field
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    alone: tuple[str, ...] = ()  # keys that a study may have instead of grids; by default its optional keys
+    instead_of_grids: tuple[str, ...] = ()  # keys that a study may have instead of grids; by default its optional keys
     reads: tuple[str, ...] = ()  # other keys of a study that it reads
     files: Callable[[Any], Iterable[Path]] = lambda part: ()  # further input files
     check: Callable[[Any, Any], None] = lambda config, problems: None
@@ -335,7 +335,7 @@ class StudyKind:
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None  # stems of its tables on the page
 
-    def wanted(self, config: Any) -> bool:
+    def requested_by(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""
         return not self.study_fields or any(getattr(config, key) for key in (*self.study_fields, *self.reads))
 
@@ -345,7 +345,7 @@ def stem(name: str, selection: Mapping[str, str]) -> str:
     return "_".join([name, *selection.values()])
 
 
-def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+def distinct_cells(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
     """Distinct selections of the dimensions `labels` among a study's cells, in order, by stem."""
     chosen = [{label: cell[label] for label in labels} for cell in cells]
     return {stem(name, one): one for one in chosen}
@@ -371,7 +371,7 @@ def kinds() -> tuple[StudyKind, ...]:
 
 @cache
 def outputs(*names: str) -> dict[str, Output]:
-    """Outputs of all study kinds by name; of kinds up to those of some names, since a module ``kind`` takes long."""
+    """Outputs of study kinds by name: of all, or of as few as have some names, since importing a kind takes long."""
     apart, found = modules("outputs"), dict[str, Output]()
     for kind in KINDS:
         if names and found.keys() >= {*names}:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, create_m
 
 from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
+from springtune.problem.materials import INCOMPRESSIBLE_REASON, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
 
 from . import fields
 from .fields import Named, OneOrMore, Section, default, one_of
@@ -126,21 +126,21 @@ class MaterialConfig(Section):
             raise refuse(f"{both}, orthotropic, has a stiffness or a test: keep the keys of one", keys[1][0])
         form = next((form for form, own in zip(MATERIAL_FORMS, given) if own), MATERIAL_FORMS[0])
         if self.angle is not None and form is not MATERIAL_FORMS[1]:
-            raise refuse("turns the axes of an orthotropic material, and this is none; remove it", "angle")
+            raise refuse("turns the axes of orthotropic moduli, which this material does not have; remove it", "angle")
         if self.plane is not None and form is not MATERIAL_FORMS[0]:
             raise refuse("is for isotropic materials; remove it, and give a 'stiffness' in plane strain", "plane")
         for key in ("terms", "equibiaxial_test", "pure_shear_test"):
             if getattr(self, key) is not None and form is not MATERIAL_FORMS[3]:
-                raise refuse("goes with a 'uniaxial_test', and this material has none; remove it", key)
+                raise refuse("needs a 'uniaxial_test', which this material does not have; remove it", key)
         if self.plane == "strain" and self.poisson_ratio == 0.5:
-            raise refuse(f"is {INCOMPRESSIBLE}", "poisson_ratio")
+            raise refuse(f"is {INCOMPRESSIBLE_REASON}", "poisson_ratio")
         for key in form:
             if getattr(self, key) is None:
                 raise refuse(f"'{key}' is missing; give {words(type(self).model_fields[key])}", key)
         return self
 
     def material(self, name: str, folder: Path = Path()) -> AnyMaterial:
-        """The material; its files are relative to a folder. Raises ValueError if there is none of these constants."""
+        """Return the material; files are relative to a folder. Raises ValueError for impossible constants."""
         if self.uniaxial_test is not None:
             from springtune.problem.materials import fit_rubber
 
@@ -402,7 +402,7 @@ class StudyConfig(Section):
 
     grids: dict[str, GridConfig] = Field({})
 
-    alone: ClassVar[list[str]] = []
+    instead_of_grids: ClassVar[list[str]] = []
     """Keys of study kinds that a study may have instead of grids."""
 
     @model_validator(mode="before")
@@ -410,8 +410,8 @@ class StudyConfig(Section):
     def _check_sections(cls, value: Any) -> Any:
         """Refuse a study without grids or a section that may replace them."""
         given = {key for key, content in value.items() if content is not None} if isinstance(value, dict) else set()
-        if given and given <= {*cls.model_fields} - {"grids", *cls.alone}:
-            others = ", ".join(map(repr, cls.alone))
+        if given and given <= {*cls.model_fields} - {"grids", *cls.instead_of_grids}:
+            others = ", ".join(map(repr, cls.instead_of_grids))
             raise refuse(f"'grids' is missing; give {words(cls.model_fields['grids'])}, or {others}", "grids")
         return value
 
@@ -423,17 +423,17 @@ def study_model(kinds: tuple[StudyKind, ...]) -> type[StudyConfig]:
     own: dict[str, Any] = {name: field for kind in kinds for name, field in kind.grid_fields.items()}
     grid = create_model("GridConfig", __base__=GridConfig, __doc__=GridConfig.__doc__, **own)
     added: dict[str, Any] = {name: field for kind in kinds for name, field in kind.study_fields.items()}
-    alone: list[str] = []
+    keys: list[str] = []
     for kind in kinds:
-        alone += kind.alone or [name for name, (_, field) in kind.study_fields.items() if field.default is None]
+        keys += kind.instead_of_grids or [key for key, (_, field) in kind.study_fields.items() if field.default is None]
     meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in made)
-    said = f"Figures and tables: {meanings}. Figures of scenes show nonlinear kinematics if a grid has them."
-    usual = Field([output.name for output in made if output.usual], description=said)
+    meaning = f"Figures and tables: {meanings}. Figures of scenes show nonlinear kinematics if a grid has them."
+    usual = Field([output.name for output in made if output.usual], description=meaning)
     added["outputs"] = OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]], usual
-    said = f"Grids of scenes. Optional with one of {', '.join(f'`{name}`' for name in alone)}."
-    several: Any = Field({}, min_length=1, title="a section for each grid, by name", description=said)
+    meaning = f"Grids of scenes. Optional with one of {', '.join(f'`{name}`' for name in keys)}."
+    several: Any = Field({}, min_length=1, title="a section for each grid, by name", description=meaning)
     added["grids"] = dict[str, grid], several
     model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
-    model.alone = alone
-    model.model_config["json_schema_extra"] = {"anyOf": [{"required": [key]} for key in ("grids", *alone)]}
+    model.instead_of_grids = keys
+    model.model_config["json_schema_extra"] = {"anyOf": [{"required": [key]} for key in ("grids", *keys)]}
     return model

@@ -61,7 +61,7 @@ class Answer(NamedTuple):
 
 
 def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "material")) -> Iterator[tuple[Answer, ...]]:
-    """The best springs alone, uniform stiffness, and springs with energies on the finest mesh of each."""
+    """Return the best springs alone, uniform stiffness and springs with energies, on each finest mesh."""
     if "stiffness_inside" not in cells:
         return
     membrane = cells.get("material_young_modulus", np.nan) * cells.get("beam_thickness", np.nan)

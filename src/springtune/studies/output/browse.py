@@ -32,7 +32,7 @@ from springtune.safe_io import write_json, write_text
 from ..config.model import VIEWS, kind_files
 from . import reading
 from .answers import ERROR_COLOURS, ERROR_RANGE, DefinitionErrors, definition_errors, status_words, what_to_type
-from .dataset import columns, flag_words, like_with_like, requested_cells, sign_of_errors
+from .dataset import against_own_laws, columns, flag_words, requested_cells, sign_of_errors
 from .text import label_text, range_text
 
 PAGE_SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
@@ -82,7 +82,7 @@ def views() -> dict[str, View]:
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
-    with reading.open(dataset) as tree, reading.guarded(dataset):
+    with reading.open(dataset) as tree, reading.guard(dataset):
         groups, found = packed(tree), overview(tree)
     attributes, library = groups[0]["attributes"], _library()
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
@@ -195,9 +195,9 @@ REFERENCES = {
 
 def _has_sign(row: dict[str, Any], values: np.ndarray) -> bool:
     """Return whether an error has a sign; norms and numbers printed without one have none."""
-    said = row.get("long_name", "")
-    stated = re.search(r"signed|less 1|- 1$|network - reference", said) is not None
-    return "without sign" not in said and (stated or bool((values < 0).any()))
+    long_name = row.get("long_name", "")
+    stated = re.search(r"signed|less 1|- 1$|network - reference", long_name) is not None
+    return "without sign" not in long_name and (stated or bool((values < 0).any()))
 
 
 def _sign_sentence(name: str, data: xr.Dataset, root: xr.Dataset) -> str:
@@ -207,10 +207,10 @@ def _sign_sentence(name: str, data: xr.Dataset, root: xr.Dataset) -> str:
     data = data if reference in data else root
     if reference not in data or not re.fullmatch("(deformation_|face_|expected_)?error", name):
         return "positive: too large"
-    said = sign_of_errors(data, reference)
+    signs = sign_of_errors(data, reference)
     if (data[reference].notnull() & (data.get("quantity_kind", "displacement") != "displacement")).any():
-        return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
-    return said
+        return f"displacements: {signs}; other quantities: positive: too large" if signs else "positive: too large"
+    return signs
 
 
 # -- arrays ------------------------------------------------------------------------------------------------------------
@@ -278,7 +278,7 @@ SOURCES = (
     Source("/samples", "samples", "deformation_error", "", "load"),
 )
 
-LOOKS = 8  # different colours of lines and dots
+LOOK_COUNT = 8  # different colours of lines and dots
 
 SMALLEST_PERCENT = 1e-4  # smaller errors stand at the end of their axis
 
@@ -336,7 +336,7 @@ def overview(tree: xr.DataTree) -> Content:
     for source in SOURCES:
         data = groups.get(source.group, xr.Dataset())
         if {source.error, "status", "definition"} <= {*data.variables}:
-            data = like_with_like(data, groups.get("/finite_strain") if source.group == "/" else None)
+            data = against_own_laws(data, groups.get("/finite_strain") if source.group == "/" else None)
             found.append(_errors(source, data))
     return {
         "sources": found,
@@ -349,7 +349,7 @@ def overview(tree: xr.DataTree) -> Content:
 
 
 def _errors(source: Source, data: xr.Dataset) -> Content:
-    """What to type, errors of definitions, and errors over run time."""
+    """Stiffnesses to type, errors of definitions, and errors over run time."""
     cells = requested_cells(data, source.error)
     cells["percent"] = (100 * cells.valid_error.abs()).clip(lower=SMALLEST_PERCENT)
     typed = [*what_to_type(cells, (source.body, "mesh_type", "material"))] if source.body else []
@@ -363,7 +363,7 @@ def _errors(source: Source, data: xr.Dataset) -> Content:
         cells["seconds"] = (cells.solve_seconds + cells.definition_seconds).fillna(0).clip(lower=SHORTEST_TIME)
     if found := sorted(definition_errors(cells), key=lambda one: one.median):
         content["errors"] = _dots(found, source.by, cells[source.by].unique())
-        content["times"] = _times(found[:LOOKS]) if "seconds" in cells else None
+        content["times"] = _times(found[:LOOK_COUNT]) if "seconds" in cells else None
     return content
 
 
@@ -378,7 +378,7 @@ def _stiffnesses(values: np.ndarray) -> str:
 def _dots(found: Sequence[DefinitionErrors], by: str, labels: Iterable[str]) -> Chart:
     """Errors of each definition: medians by label, of all, and the worst."""
     x, dots, rows = Axis(ERROR_AXIS, pd.concat([one.cells.percent for one in found]), log=True), [], []
-    names = {label: number % LOOKS for number, label in enumerate(labels)}
+    names = {label: number % LOOK_COUNT for number, label in enumerate(labels)}
     for row, one in enumerate(found):
         y, own = 100 - 100 * (row + 0.5) / len(found), one.cells.percent
         median, worst = f"{100 * one.median:.2g} %", error_text(one.worst.valid_error)
@@ -391,7 +391,7 @@ def _dots(found: Sequence[DefinitionErrors], by: str, labels: Iterable[str]) -> 
 
 
 def _times(found: Sequence[DefinitionErrors]) -> Chart:
-    """Median error over median run time, a line a definition through its mesh sizes."""
+    """Median error over median run time, one line per definition through its mesh sizes."""
     medians = {", ".join(one.labels): one.cells.groupby("size", sort=False)[["seconds", "percent"]].median()
                for one in found}  # fmt: skip
     whole, lines, dots = pd.concat(medians), [], []
@@ -399,8 +399,8 @@ def _times(found: Sequence[DefinitionErrors]) -> Chart:
     for look, (name, rows) in enumerate(medians.items()):
         lines.append((look, [(x.at(time), y.at(error)) for time, error in rows.to_numpy()]))
         for place, (size, time, error) in zip(lines[-1][1], rows.itertuples()):
-            said = ", ".join(filter(None, (name, size)))
-            dots.append((f"look{look}", *place, f"{said}: {error:.2g} %, {time:.2g} s"))
+            label = ", ".join(filter(None, (name, size)))
+            dots.append((f"look{look}", *place, f"{label}: {error:.2g} %, {time:.2g} s"))
     return Chart(x, y, lines=lines, dots=dots, names={name: look for look, name in enumerate(medians)})
 
 
@@ -408,14 +408,14 @@ def _times(found: Sequence[DefinitionErrors]) -> Chart:
 
 
 def _curves(curves: xr.Dataset) -> Content:
-    """Charts of the error over k / (E t), one for each mesh type, material and load: nonlinear where there is one."""
+    """Charts of the error over k / (E t), one for each mesh type, material and load: nonlinear if available."""
     ratios, known = curves.stiffness_ratio.values, curves.deformation_error.notnull().any("stiffness_ratio")
     found = pd.DataFrame(columns(curves, known, ("predicted_stiffness", "best_stiffness")))
     curves = curves[["deformation_error", "stiffness"]]
     found["place"] = np.argwhere(known.values).tolist()
     panels = dict(list(found.groupby([*PANEL_LABELS], sort=False)))
     shown = [panel for panel in panels if panel[-1] == "nonlinear" or (*panel[:-1], "nonlinear") not in panels]
-    looks = {_size(size): number % LOOKS for number, size in enumerate(curves.mesh_size.values)}
+    looks = {_size(size): number % LOOK_COUNT for number, size in enumerate(curves.mesh_size.values)}
     x, charts = Axis("k / (E t)", ratios), []
     for panel in shown[:MOST_PANELS]:
         lines, dots, members = [], [], panels[panel]

@@ -106,13 +106,13 @@ class Comparison(NamedTuple):
     """Differences of two datasets; differing `attributes` do not count as different results."""
 
     groups: list[GroupChanges]
-    alone: tuple[list[str], ...]
+    only_groups: tuple[list[str], ...]
     attributes: dict[str, tuple[str, str]]
 
     @property
     def different(self) -> bool:
         """Whether groups, labels, cells, variables, statuses or values differ."""
-        return any(self.alone) or any(group.different for group in self.groups)
+        return any(self.only_groups) or any(group.different for group in self.groups)
 
     @property
     def changes(self) -> list[Change]:
@@ -129,7 +129,7 @@ def compare(
     ignored: Collection[str] = (),
     most: int | None = None,
 ) -> Comparison:
-    """Compare two datasets by label; list at most so many changes of each variable.
+    """Compare two datasets by label; list at most `most` changes of each variable.
 
     Numeric labels match in nine digits, NaN equals NaN, and `MEASURED_VARIABLES` is left out.
     """
@@ -141,11 +141,11 @@ def compare(
             raise ValueError(f"--ignore {pattern}: neither has it; {nearest(pattern, held)}")
     left_out = {name for name in held if any(fnmatchcase(name, one) for one in (*MEASURED_VARIABLES, *ignored))}
     known = sorted({*nodes[0], *nodes[1]})
-    wanted = {"/" + name.strip("/") for name in groups} or {*known}
-    for name in sorted(wanted - {*known}):
+    requested = {"/" + name.strip("/") for name in groups} or {*known}
+    for name in sorted(requested - {*known}):
         raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
     roots = [side["/"] for side in nodes]
-    chosen = [[path for path in side if path in wanted] for side in nodes]
+    chosen = [[path for path in side if path in requested] for side in nodes]
     both = {path: [side[path] for side in nodes] for path in chosen[0] if path in chosen[1]}
     found = [_compare_group(one, pair, roots, left_out, tolerance or Tolerance(), most) for one, pair in both.items()]
     facts = [one.attrs | from_json(one.attrs.get("software")) | from_json(one.attrs.get("inputs")) for one in trees]
@@ -184,9 +184,9 @@ def _compare_group(
         axis, other = axes[0], axes[-1]
         found.sizes[name] = len(axis.union(other, sort=False))
         found.units[name] = next(str(data[name].attrs.get("units", "1")) for data in pair if name in data.dims)
-        alone = axis.difference(other, sort=False).tolist(), other.difference(axis, sort=False).tolist()
-        if any(alone) and all(data.sizes[name] and name in data.indexes for data in given):
-            found.labels[name] = alone
+        of_one = axis.difference(other, sort=False).tolist(), other.difference(axis, sort=False).tolist()
+        if any(of_one) and all(data.sizes[name] and name in data.indexes for data in given):
+            found.labels[name] = of_one
     if all("status" in data for data in pair) and not _why_unlike(*(data["status"] for data in pair)):
         found.cells = _cells_of_one(asked, dimensions, most)
     both: tuple[Any, ...] = xr.align(*pair, *asked, join="inner", copy=False)
@@ -215,8 +215,8 @@ def _cells_of_one(asked: Arrays, dimensions: set[str], most: int | None) -> tupl
     """Cells that only one side requests, for each side."""
     masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
     # On the labels of one side: the union of all may be the square of either.
-    alone = (mask & ~other.reindex_like(mask, fill_value=False) for mask, other in zip(masks, masks[::-1]))
-    found = (records(xr.Dataset(), cells, ()) for cells in alone)
+    of_one = (mask & ~other.reindex_like(mask, fill_value=False) for mask, other in zip(masks, masks[::-1]))
+    found = (records(xr.Dataset(), cells, ()) for cells in of_one)
     return tuple(CellsOfOne(len(rows), rows[:most]) for rows in found)
 
 

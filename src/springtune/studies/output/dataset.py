@@ -205,7 +205,7 @@ def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashabl
 
 
 def _chunk_shape(shape: Sequence[int], cells: int) -> tuple[int, ...]:
-    """Chunk shape of so many cells: whole last dimensions, then as many of the others as fit."""
+    """Return the shape of chunks: whole last dimensions, then as many of the others as fit."""
     cells_of_one = np.cumprod((1, *shape[:0:-1]))[::-1]  # along each dimension
     return tuple(np.clip(cells // cells_of_one, 1, shape).tolist())
 
@@ -263,14 +263,14 @@ def as_words(array: xr.DataArray) -> np.ndarray:
 # -- the group and the labels that a figure shows ----------------------------------------------------------------------
 
 
-def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.Dataset:
-    """Dataset of a group; `data` itself if it is no tree."""
+def group(data: xr.DataTree | xr.Dataset, name: str, needs_tree: bool = False) -> xr.Dataset:
+    """Return the dataset of a group; `data` itself if it is no tree, which `needs_tree` refuses."""
     if isinstance(data, xr.DataTree):
         if not data.variables if name == "/" else name not in data.children:
             lack = "scenes of beams" if name == "/" else f"group '/{name}'"
             raise ValueError(f"the dataset has no {lack}; it has {_quoted(f'/{one}' for one in data.children)}")
         return data[name].to_dataset()
-    if not alone:
+    if needs_tree:
         raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
     return data
 
@@ -413,8 +413,8 @@ def own_laws(data: xr.Dataset) -> list[str]:
     return [law for law in own if law in data.reference.values]
 
 
-def like_with_like(root: xr.Dataset, finite: xr.Dataset | None) -> xr.Dataset:
-    """Root with errors of nonlinear networks against the law of each material at finite strain, where there are any."""
+def against_own_laws(root: xr.Dataset, finite: xr.Dataset | None) -> xr.Dataset:
+    """Return the root with errors of nonlinear networks against finite strain, by each material's law, if computed."""
     laws = [] if finite is None else own_laws(finite)
     if finite is None or not laws:
         return root

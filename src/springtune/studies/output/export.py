@@ -49,7 +49,7 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
 
 
 def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False) -> str:
-    """Write a group as CSV or Parquet, by the ending of a path; return what was written in words."""
+    """Write a group as CSV or Parquet, by the ending of a path; return a line on the written file."""
     ending = path.suffix.lower()
     if ending not in TABLE_ENDINGS:
         remedy = f"give a file in {' or '.join(TABLE_ENDINGS)}"

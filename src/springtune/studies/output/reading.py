@@ -57,7 +57,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
     path = dataset_file(path)
     with ExitStack() as stack:
-        with readable(path), bounded(OPENING_BYTES):
+        with refuse_damaged_file(path), bounded(OPENING_BYTES):
             check_alone(path)
             file = stack.enter_context(h5netcdf.File(path, decode_vlen_strings=True))
             attributes = dict(file.attrs)
@@ -66,14 +66,14 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         name = attributes.get("study", "unknown")
         if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
             raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
-        with readable(path), bounded(OPENING_BYTES):
+        with refuse_damaged_file(path), bounded(OPENING_BYTES):
             found = tree(file)
         found.set_close(stack.pop_all().close)
     return found
 
 
 @contextmanager
-def readable(path: str | os.PathLike[str]) -> Iterator[None]:
+def refuse_damaged_file(path: str | os.PathLike[str]) -> Iterator[None]:
     """Context that turns any error of the libraries on a damaged file into a refusal."""
     try:
         yield
@@ -94,7 +94,7 @@ def dataset_file(path: str | os.PathLike[str]) -> Path:
 
 
 @contextmanager
-def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
+def guard(path: str | os.PathLike[str]) -> Iterator[None]:
     """Context that turns any error on a damaged dataset into a refusal."""
     try:
         yield
@@ -160,5 +160,5 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
         raise ValueError(f"{why}, nor has its study beams;{shown} {others}")
     from .dataset import network
 
-    with guarded("the group '/fields'"):
+    with guard("the group '/fields'"):
         return network(data, labels)

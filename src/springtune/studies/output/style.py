@@ -216,7 +216,7 @@ def wrap_to_panel(panel: Axes, texts: Iterable[str], size: float | None = None, 
 # -- lines -------------------------------------------------------------------------------------------------------------
 
 
-def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:
+def add_legend(panel: Axes, notes: Iterable[str] = (), why: str = "", key: Iterable[Artist] = ()) -> None:
     """Name lines in the order of their ends, and write notes below; without lines write `why`."""
     ends = {}
     for line in panel.get_lines():
@@ -231,7 +231,7 @@ def add_legend(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterab
         place: Any = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
         texts = [wrap_to_panel(panel, [str(one.get_label())], share=WIDEST_NAME_SHARE) for one in handles]
         panel.legend(handles, texts, handlelength=2.2, borderaxespad=0.3, labelspacing=0.35, **place)
-    add_note(panel, said)
+    add_note(panel, notes)
 
 
 def add_note(panel: Axes, texts: Iterable[str]) -> None:
@@ -242,7 +242,7 @@ def add_note(panel: Axes, texts: Iterable[str]) -> None:
 
 
 def write_reason(panel: Axes, text: str, bare: bool = True) -> None:
-    """Write into an empty panel what is missing and why."""
+    """Write into an empty panel the reason why it is empty."""
     place: Any = {"transform": panel.transAxes, "ha": "center", "va": "center"}
     panel.text(0.5, 0.5, wrap_to_panel(panel, [text], 8), color="0.25", **place)
     if bare:
@@ -250,15 +250,15 @@ def write_reason(panel: Axes, text: str, bare: bool = True) -> None:
         panel.grid(False)
 
 
-def add_title(figure: Figure | SubFigure | None, title: str, said: str = "") -> None:
+def add_title(figure: Figure | SubFigure | None, title: str, note: str = "") -> None:
     """Write the title of a figure, and a note below all panels, wrapped to its width."""
     if figure is None:
         return
     width = figure.bbox.width / figure.dpi
     figure.suptitle(wrap_to_width(title, width - 0.2, 8.5), x=0.05 / width, ha="left")
-    if said:
-        said = wrap_to_width(said, width - 0.2)
-        figure.supxlabel(said, x=0.05 / width, ha="left", multialignment="left", fontsize=SMALL_TEXT, color="0.25")
+    if note:
+        note = wrap_to_width(note, width - 0.2)
+        figure.supxlabel(note, x=0.05 / width, ha="left", multialignment="left", fontsize=SMALL_TEXT, color="0.25")
 
 
 def small_multiples(
@@ -270,7 +270,7 @@ def small_multiples(
     draw: Callable[[Axes, Any], tuple[Iterable[str], str]],
     *,
     sharey: bool = False,
-    said: str = "",
+    note: str = "",
     key: Sequence[Artist] = (),
 ) -> np.ndarray:
     """Draw a panel of some `height` [inch] for each title; `draw` returns notes, and the reason if it drew no line."""
@@ -292,13 +292,13 @@ def small_multiples(
             height = max(height, line_height * names + 0.4)
     for panel in axes[:, 1:].flat if sharey else ():
         panel.set_ylabel("")
-    add_title(figure, title, said)
+    add_title(figure, title, note)
     if key:
         place: dict[str, Any] = {"loc": "outside upper right", "ncols": len(key)} if figure else {}
         (figure or flat[-1]).legend(handles=key, **place)
     if ax is None and isinstance(figure, Figure):
         tall = 0.2 + (height + line_height * lines) * rows
-        figure.set_size_inches(wide, tall + line_height * (bool(said) + bool(key)))
+        figure.set_size_inches(wide, tall + line_height * (bool(note) + bool(key)))
     return flat
 
 
@@ -309,7 +309,7 @@ LARGEST_ERROR_SHOWN = 100.0  # largest error of a curve in a plot [%]
 BEYOND_SMALL_STRAIN = "beyond small strain"
 """Note of a figure on errors whose reference does not apply, `reference_applies` false."""
 
-NO_RESULT, NOT_ASKED = "×", "–"  # cells of a heat map without an error
+NO_RESULT, NOT_REQUESTED = "×", "–"  # cells of a heat map without an error
 
 
 @styled
@@ -334,7 +334,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     """Draw the deformation error over uniform stiffness, and its zero."""
     _, ((panel,),) = panels(ax, figsize=(COLUMN_WIDTH, 2.5))
-    error, said = 100 * curve.error, []
+    error, notes = 100 * curve.error, []
     unit, written = power_of_ten(float(curve.stiffness.max()))
     stiffness, colour = curve.stiffness / unit, line(0)["color"]
     panel.axhline(0.0, color="0.6", linewidth=0.7)
@@ -350,10 +350,10 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     if len(known):  # a beam that buckled errs by thousands
         low, high = min(1.1 * known.min(), 0.0), max(1.1 * known.max(), 1.0)
         panel.set_ylim(*np.clip([low, high], -LARGEST_ERROR_SHOWN, LARGEST_ERROR_SHOWN))
-        said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
+        notes = [sign_sentence({"": float(np.nansum(curve.displacement))})]
     else:
         write_reason(panel, curve.message or "There is no reference, and so no error.", bare=False)
-    add_legend(panel, said)
+    add_legend(panel, notes)
     return panel
 
 
@@ -377,14 +377,14 @@ def heat_map(
     panel: Axes, errors: "pd.DataFrame", asked: np.ndarray, starred: np.ndarray | bool = False, sign: str = ""
 ) -> np.ndarray:
     """Draw cells coloured by the size of an error [%], with row and column names; return the texts of the cells."""
-    texts, stars = np.where(asked, NO_RESULT, NOT_ASKED).astype(object), np.broadcast_to(starred, errors.shape)
+    texts, stars = np.where(asked, NO_RESULT, NOT_REQUESTED).astype(object), np.broadcast_to(starred, errors.shape)
     for place in zip(*np.nonzero(np.isfinite(errors.values))):
         texts[place] = error_text(errors.values[place], sign) + "*" * int(stars[place])
     shade, (low, high) = np.log10(np.clip(np.abs(errors.values), *ERROR_RANGE)), np.log10(ERROR_RANGE)
     colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
     panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
     for (row, column), text in np.ndenumerate(texts):
-        colour = "white" if shade[row, column] > 1.2 else "0.5" if text == NOT_ASKED else "k"
+        colour = "white" if shade[row, column] > 1.2 else "0.5" if text == NOT_REQUESTED else "k"
         panel.text(column, row, text, ha="center", va="center", fontsize=SMALL_TEXT, color=colour)
     panel.set_xticks(range(errors.shape[1]), map(no_mathematics, errors.columns), rotation=90)
     panel.set_yticks(range(len(errors)), map(no_mathematics, errors.index))

@@ -38,15 +38,15 @@ COMPARED_VARIABLES = {"status", "reference_displacement", "reference_applies", "
 
 
 def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFINITIONS_LISTED) -> str:
-    """Summarise a study's cells, with the errors of at most so many definitions."""
-    from .dataset import like_with_like, requested_cells
+    """Summarise a study's cells, with the errors of at most `most` definitions."""
+    from .dataset import against_own_laws, requested_cells
 
     states = [state for name, data in groups.items() for state in _states(name, data)]
-    rows = [[what, str(count), said] for what, count, said, _ in states if count]
+    rows = [[what, str(count), statuses] for what, count, statuses, _ in states if count]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
     for name, names in COMPARED.items():
         if name in groups and "definition" in groups[name].get(names[0], groups[name]).dims:
-            data = like_with_like(groups[name], groups.get("/finite_strain") if name == "/" else None)
+            data = against_own_laws(groups[name], groups.get("/finite_strain") if name == "/" else None)
             cells = requested_cells(data, names[0])
             lines += _errors(cells, data, names, most)
             if name == "/":  # of shapes quantities have errors
@@ -79,8 +79,8 @@ def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, int, str, dict
         lost = {status: _cells(data, variable == status, message) for status in unsolved}
         part = label.removesuffix("status").strip("_").replace("_", " ")
         what = "scenes" if name == "/" else ", ".join(filter(None, (name.strip("/"), part)))
-        said = ", ".join(f"{count} {word}" for word, count in count_statuses(flags).items())
-        yield what, int(np.count_nonzero(flags)), said, lost
+        statuses = ", ".join(f"{count} {word}" for word, count in count_statuses(flags).items())
+        yield what, int(np.count_nonzero(flags)), statuses, lost
 
 
 def _cells(data: "xr.Dataset", there: "xr.DataArray", message: str) -> Cells:
@@ -88,8 +88,8 @@ def _cells(data: "xr.Dataset", there: "xr.DataArray", message: str) -> Cells:
     from .dataset import records  # here, since reports of a run do without xarray
 
     units = {str(name): str(data[name].attrs.get("units", "1")) for name in there.dims}
-    said = [(str(row.pop(message)), row) for row in records(data, there, [message])]
-    return [(cell_text(labels, units), why) for why, labels in said]
+    rows = [(str(row.pop(message)), row) for row in records(data, there, [message])]
+    return [(cell_text(labels, units), why) for why, labels in rows]
 
 
 def _cell_lines(cells: Cells) -> Iterator[str]:
@@ -128,7 +128,7 @@ def _errors(cells: "pd.DataFrame", data: "xr.Dataset", names: tuple[str, str], m
 
 
 def _stiffness_to_type(cells: "pd.DataFrame") -> Iterator[str]:
-    """What to type on the finest mesh of each type and material, of the best definitions."""
+    """Stiffnesses to type on the finest mesh of each type and material, of the best definitions."""
     answers = [one for found in what_to_type(cells) for one in found]
     rows = [
         [one.definition + " +" * one.energies, *one.labels, f"{1e3 * one.mesh_size:.4g} mm",
@@ -194,7 +194,7 @@ def info(path: str | os.PathLike[str]) -> Info:
     >>> "groups, their variables and dimensions" in said, "springtune" in said
     (True, True)
     """
-    with reading.open(path) as tree, reading.guarded(path):
+    with reading.open(path) as tree, reading.guard(path):
         file, study = reading.dataset_file(path), tree.attrs.get("study", "unknown")
         made = f", made {tree.attrs['created']}" if "created" in tree.attrs else ""
         head = [tree.attrs.get("title", study), f"study {study}: {file}, {bytes_text(file.stat().st_size)}{made}"]
@@ -215,8 +215,8 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
     lines = ["made with", f"  springtune {tree.attrs.get('springtune_version', 'unknown')}"]
     lines += [f"  commit {tree.attrs['git_commit']}"] if tree.attrs.get("git_commit") else []
     software = from_json(tree.attrs.get("software")).items()
-    said = ", ".join(f"{name} {version}" for name, version in software if version != "none")
-    lines += [f"  {said}"] if said else []
+    versions = ", ".join(f"{name} {version}" for name, version in software if version != "none")
+    lines += [f"  {versions}"] if versions else []
     return lines + [f"  sha256 {digest}  {name}" for name, digest in from_json(tree.attrs.get("inputs")).items()]
 
 
@@ -225,22 +225,22 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
 Jobs = Mapping[str, Job]
 
 
-def ending(study: "Study", jobs: Jobs, since: float) -> str:
+def success_report(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a successful run."""
     took, results = clock(time.time() - since), _result_paths(_folder(jobs))
-    told = aligned([["new", _count_new_results(jobs, since)], ["took", took], ["results", results]], 0)
-    return f"\n{_stored_summary(study, jobs)}\n{told}\n"
+    rows = aligned([["new", _count_new_results(jobs, since)], ["took", took], ["results", results]], 0)
+    return f"\n{_stored_summary(study, jobs)}\n{rows}\n"
 
 
-def broken(study: "Study", jobs: Jobs, since: float) -> str:
+def failure_report(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a failed run."""
     logs = "".join(f"  {_last_line(path)}\n    its log: {path}\n" for path in _failed_logs(jobs, since))
     kept = "What is computed is kept: the same command takes up where this one stopped."
     return f"\n{study.name} is not complete: a job failed or was stopped.\n{logs}{kept}\n"
 
 
-def beside(study: "Study", jobs: Jobs, since: float) -> str:
-    """Report on another study that the paper reads."""
+def other_study_report(study: "Study", jobs: Jobs, since: float) -> str:
+    """Report on another study, whose results the paper reads, at the end of a run."""
     undone = [job.name for job in jobs.values() if job.stage and not job.record.exists()]
     lines = [f"new in {study.name}: {_count_new_results(jobs, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
@@ -248,12 +248,11 @@ def beside(study: "Study", jobs: Jobs, since: float) -> str:
 
 
 def _last_line(log: Path) -> str:
-    said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
-    if said:
-        return said[-1].strip()
+    lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
+    if lines:
+        return lines[-1].strip()
     room = os.statvfs(log.parent)
-    full = room.f_blocks and not room.f_bavail
-    return "it could say nothing: the disk is full; make room" if full else "it said nothing"
+    return "the log is empty" + ": the disk is full; make room" * bool(room.f_blocks and not room.f_bavail)
 
 
 def _failed_logs(jobs: Jobs, since: float) -> list[Path]:
@@ -267,8 +266,8 @@ def _folder(jobs: Jobs) -> Path:
     return next(iter(jobs.values())).folder
 
 
-def reminder(folder: Path) -> str:
-    """Report if nothing was to do."""
+def idle_report(folder: Path) -> str:
+    """Report of a run without work to do."""
     try:
         lines = (folder / SUMMARY).read_text().splitlines()
     except OSError:

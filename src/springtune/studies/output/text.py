@@ -36,8 +36,8 @@ def label_text(dimension: str, label: object, unit: str = "1") -> str:
         return with_unit(dimension, float(label), digits=6).replace("\u00a0", " ")
     if dimension == "mesh_size" and not float(label):  # of a shape's own mesh
         return "size of the file"
-    said = number_text(float(label), unit)
-    return said if dimension == "mesh_size" else f"{dimension.replace('_', ' ')} {said}"
+    shown = number_text(float(label), unit)
+    return shown if dimension == "mesh_size" else f"{dimension.replace('_', ' ')} {shown}"
 
 
 def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
@@ -76,7 +76,7 @@ def range_text(values: Iterable[float]) -> str:
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
-    """Decimals that show so many significant digits of a column's largest number; None if there would be too many."""
+    """Decimals that show some significant digits of a column's largest number; None if there would be too many."""
     sizes = [abs(value) for value in values if math.isfinite(value) and value]
     if not sizes:
         return 0

@@ -16,7 +16,7 @@ from springtune.safe_io import write_bytes, write_json
 
 from ..output.text import cell_text
 from . import PaperError, check_typst, numbers
-from .numbers import HASH_DIGITS, Dataset, Entry, dataset_of, validated
+from .numbers import HASH_DIGITS, Dataset, Entry, dataset_of, validate_entry
 
 MAIN = "main.typ"
 
@@ -138,7 +138,7 @@ def draw(
     declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: Path, examples: Path = Path("examples")
 ) -> dict[str, Any]:
     """Draw the figures of a paper as PDF files."""
-    drawings = {name: validated(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
+    drawings = {name: validate_entry(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
     for name, drawing in drawings.items():
         write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))
     return {name: _origin(drawing, datasets, f"figure {name}") for name, drawing in drawings.items()}

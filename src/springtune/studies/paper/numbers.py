@@ -53,7 +53,7 @@ class Dataset:
             "title": attributes["title"],
             "version": attributes["springtune_version"],
             "commit": attributes["git_commit"][:HASH_DIGITS] or "no commit",
-            "changed": attributes["git_commit"].endswith(keys.CHANGED),
+            "changed": attributes["git_commit"].endswith(keys.CHANGED_ENDING),
             "created": attributes["created"][:10],
             "software": json.loads(attributes["software"]),
             "sha256": self.sha256[:HASH_DIGITS],
@@ -77,7 +77,7 @@ def dataset_of(datasets: Mapping[str, Dataset], study: str, what: str) -> Datase
     """Return the dataset of a study."""
     if study not in datasets:
         raise PaperError(
-            f"{what}: no dataset of the study '{study}' was given; there is {', '.join(datasets) or 'none'}: "
+            f"{what}: no dataset of the study '{study}' was given; given are {', '.join(datasets) or 'none'}: "
             f"run config/{study}.yaml and give its results/{study}/dataset.nc"
         )
     return datasets[study]
@@ -185,14 +185,14 @@ def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: M
         raise PaperError(f"{', '.join(twice)}: declared twice, in numbers.yaml and printed.yaml; rename one")
     found: dict[str, Any] = {}
     for name, entry in printed.items():
-        one = validated(Printed, entry, name)
+        one = validate_entry(Printed, entry, name)
         value = float(one.printed) * TEXT_UNITS[one.unit][1]
         found[name] = {"text": one.printed.replace("-", "−"), "unit": one.unit, "value": value, "source": one.where}
     wrong = []
     for name, entry in declared.items():
         try:
-            found[name] = _evaluate(validated(Number, entry, name), found, datasets, name)
-        except PaperError as error:  # told together with what else is wrong
+            found[name] = _evaluate(validate_entry(Number, entry, name), found, datasets, name)
+        except PaperError as error:  # reported together with what else is wrong
             wrong.append(str(error))
             found[name] = {"text": None, "unit": "", "value": None, "source": ""}
     if wrong:
@@ -205,9 +205,9 @@ def _evaluate(number: Number, found: Mapping[str, Any], datasets: Mapping[str, D
         value, why = _formula(number.formula, found, name), f"the formula '{number.formula}' has no value"
     else:
         cells = _cells(number, datasets, name)
-        value, said = _reduce(number, cells, name), next((f": {one}" for one in map(str, cells.message) if one), "")
+        value, reason = _reduce(number, cells, name), next((f": {one}" for one in map(str, cells.message) if one), "")
         why = (
-            f"{datasets[number.study].path} has no value of {number.source()}{said}; run config/{number.study}.yaml "
+            f"{datasets[number.study].path} has no value of {number.source()}{reason}; run config/{number.study}.yaml "
             "again with what it needs, or declare the number optional and give the text a branch without it"
         )
     there = math.isfinite(value)
@@ -219,19 +219,19 @@ def _evaluate(number: Number, found: Mapping[str, Any], datasets: Mapping[str, D
 
 def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
     """Evaluate a table: titles and formatted cells."""
-    made = validated(Table, declared, name)
-    columns = [validated(Number, entry, name) for entry in made.columns]
+    made = validate_entry(Table, declared, name)
+    columns = [validate_entry(Number, entry, name) for entry in made.columns]
     rows, studies = [], set()
     for entry in made.rows:
         texts = []
         for column in made.columns:
             at = {key: label for part in (made.all, entry, column) for key, label in part.get("at", {}).items()}
-            number = validated(Number, {**made.all, **entry, **column, "at": at}, name)
+            number = validate_entry(Number, {**made.all, **entry, **column, "at": at}, name)
             studies.add(number.study)
             cells = _cells(number, datasets, name, of_table=True)
             value = _reduce(number, cells, name)
             texts.append(number.text(value) + _marks(number, cells) if math.isfinite(value) else "–")
-        rows.append(_heading(validated(Number, entry, name)) | {"cells": texts})
+        rows.append(_heading(validate_entry(Number, entry, name)) | {"cells": texts})
     data = "; ".join(f"{study}, sha256 {datasets[study].sha256[:HASH_DIGITS]}" for study in sorted(studies))
     return {"columns": [_heading(one) for one in columns], "rows": rows, "data": data}
 
@@ -245,7 +245,7 @@ def _heading(number: Number) -> dict[str, str]:
     return filled | {"unit": number.unit}
 
 
-def validated(model: type[Any], entry: object, name: str) -> Any:
+def validate_entry(model: type[Any], entry: object, name: str) -> Any:
     """Validate a declaration by its model."""
     try:
         return model.model_validate(entry)
@@ -265,9 +265,9 @@ def _cells(number: Number, datasets: Mapping[str, Dataset], name: str, of_table:
     data = (one.tree[group] if group else one.tree).to_dataset()
     flag, _, status = number.where.partition("=")
     columns = {"value": variable, "over": number.over, "flag": flag.rstrip("!")} | {key: key for key in number.marks}
-    for wanted in filter(None, columns.values()):
-        if wanted not in data.variables:
-            raise PaperError(f"{name}: {one.path} has no variable '{wanted}' in /{group}; give one that it has")
+    for column in filter(None, columns.values()):
+        if column not in data.variables:
+            raise PaperError(f"{name}: {one.path} has no variable '{column}' in /{group}; give one that it has")
     if number.where and status not in STATUS:
         raise PaperError(f"{name}: '{status}' is no status; give one of {', '.join(STATUS)}")
     array = data[variable]

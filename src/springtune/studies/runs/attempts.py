@@ -56,7 +56,7 @@ def do_in_worker(name: str, content: dict[str, Any]) -> int:
                 except BrokenProcessPool:
                     key = os.pread(under_way.fileno(), LONGEST_KEY, 0).rstrip(b"\0").decode()
             if not key or key in lost:
-                raise SystemExit("the process of this job died: is the machine's memory short?")
+                raise SystemExit("the process of this job died: a crash, or too little memory")
             lost[key] = "the process that solved it died: a crash, or too little memory"
 
 
@@ -107,7 +107,7 @@ class Attempts:
             self._note("")
 
     def _note(self, key: str) -> None:
-        """Note the task under way, where another process can read it."""
+        """Note the current task, where the parent process can read it."""
         if self.under_way is not None:
             os.pwrite(self.under_way, key.encode().ljust(LONGEST_KEY, b"\0"), 0)
 

@@ -31,7 +31,7 @@ from springtune.springs.base import DEFINITIONS
 from ..config.model import Study, kinds
 from .source import COMMIT_FILE, PACKAGE, checksum, clone, hash_of
 
-CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
+CARRIER_PACKAGES = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
 """Packages whose versions do not influence results: they carry numbers as they are."""
 
 DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
@@ -113,7 +113,7 @@ def closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
         waiting |= graph.find_modules_directly_imported_by(one) - found - left_out
     ours = {name for name in found if name.partition(".")[0] == PACKAGE.name}
     files = {file for name in ours for file in _files(name)}
-    return Closure(frozenset(files), frozenset(found - ours - CARRIERS - sys.stdlib_module_names))
+    return Closure(frozenset(files), frozenset(found - ours - CARRIER_PACKAGES - sys.stdlib_module_names))
 
 
 def full_name(module: str) -> str:
@@ -286,9 +286,9 @@ def material_key(material: Material, density: bool = False) -> dict[str, Any]:
 SOFTWARE = ("cvxopt h5netcdf h5py meshio netgen-mesher numba numpy scikit-fem scipy snakemake xarray").split()
 """Distributions whose versions a dataset holds."""
 
-CHANGED = "+changes"  # ending of `git_commit` if files differ from the commit
+CHANGED_ENDING = "+changes"  # ending of `git_commit` if files differ from the commit
 
-PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
+PRINTED_SOURCES = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
 """Sources of printed values by file name."""
 
 
@@ -315,13 +315,13 @@ def origin(study: Study, package: Path = PACKAGE) -> dict[str, str]:
     }
     if study.printed_path:
         name = study.printed_path.name
-        found["references"] = f"paper_*: as printed in {PRINTED.get(name, name)}"
+        found["references"] = f"paper_*: as printed in {PRINTED_SOURCES.get(name, name)}"
     found |= {f"figure_{name}": str(value) for name, value in study.style.items()}
     return found | ({"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {})
 
 
 def inputs(study: Study) -> dict[str, str]:
-    """SHA-256 of each input file, by its path in the study's folder; of others only the last folder is named."""
+    """SHA-256 of each input file, by its path in the study's folder; elsewhere by its last folder and name."""
     folder, found = study.path.parent.resolve(), {}
     for file in map(Path.resolve, input_files(study)):
         inside = file.is_relative_to(folder)
@@ -336,11 +336,11 @@ def input_files(study: Study) -> list[Path]:
 
 
 def library_commit(package: Path = PACKAGE) -> str:
-    """Commit of the library, empty if unknown; it ends with `CHANGED` if files of the clone differ."""
+    """Commit of the library, empty if unknown; it ends with `CHANGED_ENDING` if files of the clone differ."""
     noted, root = package / COMMIT_FILE, clone(package)
     if noted.is_file() or root is None:
         return noted.read_text().strip() if noted.is_file() else ""
-    command = ["git", "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*"]
+    command = ["git", "describe", "--always", "--abbrev=40", f"--dirty={CHANGED_ENDING}", "--exclude=*"]
     try:
         return subprocess.run(command, cwd=root, capture_output=True, check=True, text=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):

@@ -26,7 +26,7 @@ class LockedError(ValueError):
 
 
 def claim(folder: Path, config: Path) -> None:
-    """Note the study that a folder belongs to."""
+    """Write into a folder which study it belongs to."""
     place, path = (Path(os.path.abspath(one)) for one in (folder.parent.parent, config))
     note = {"config": str(path.relative_to(place) if path.is_relative_to(place) else path)}
     write_json(folder / STUDY_FILE, note)
@@ -50,14 +50,14 @@ def check_claim(folder: Path, config: Path) -> None:
 def lock(folders: Iterable[Path]) -> None:
     """Note that this process computes studies, and lock the notes until its end."""
     since, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)
-    said = f"process {os.getpid()} on {platform.node()} computes it since {since} ({command})"
+    owner = f"process {os.getpid()} on {platform.node()} computes it since {since} ({command})"
     for folder in folders:
         (folder / RUN_FILE).parent.mkdir(parents=True, exist_ok=True)
         file = (folder / RUN_FILE).open("a+", encoding="utf-8")
         _lock(file, folder)
         LOCKED_NOTES.append(file)
         file.truncate(0)
-        file.write(f"{said}; wait for its end, or stop it: kill {os.getpid()}")
+        file.write(f"{owner}; wait for its end, or stop it: kill {os.getpid()}")
         file.flush()
 
 

@@ -1,7 +1,7 @@
 """Jobs of a study, and why a job runs again.
 
-Tasks of its stages are in jobs of about equal work by numbers of particles, the same on each machine; further jobs make
-its dataset, figures, tables, pages and the paper.
+A job does a bundle of tasks of a stage; bundles have about equal expected work and are the same on each machine. Other
+jobs make the dataset, figures, tables, pages and the paper.
 """
 
 import json
@@ -27,22 +27,22 @@ class Task:
     """A task of a stage; tasks of one name are in one bundle."""
 
     values: Mapping[str, Any]  # argument of `solve`, without labels, so that a new label computes nothing again
-    also: Sequence[object] = ()  # code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`
+    code: Sequence[object] = ()  # code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`
     labels: Mapping[str, Any] = field(default_factory=dict)  # of its cell of the dataset; a label may be several
-    seconds: float = 0.0  # expected, for bundles of about equal work
+    seconds: float = 0.0  # expected time, for bundles of about equal work
     name: str = ""  # by default a hash of its values
     file: str = ""  # stem of the file of its result; by default its key
     shared: Mapping[str, Any] = field(default_factory=dict)  # values that all tasks of that file share
     key: str = ""  # by default a hash of all inputs
 
     def key_of(self, stage: Stage) -> str:
-        """Key of its result."""
-        return self.key or hash_of(self.values, stage_key(stage.module, attempts.MODULE), self.also)
+        """Return the key of the task's result."""
+        return self.key or hash_of(self.values, stage_key(stage.module, attempts.MODULE), self.code)
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job of a run; `digest` is a hash of all that it depends on, without products of other jobs."""
+    """A job of a run; it runs again if `digest` changes, a hash of its tasks and code without other jobs' products."""
 
     folder: Path
     name: str
@@ -55,21 +55,21 @@ class Job:
 
     @property
     def record(self) -> Path:
-        """Record of the done job."""
+        """File that the job writes at its end, its record."""
         return self.folder / RECORDS / f"{self.name}.json"
 
     @property
     def tasks(self) -> Path:
-        """Note of its tasks."""
+        """File with the tasks of the job."""
         return self.folder / TASKS / f"{self.name}.json"
 
     @property
     def results(self) -> set[tuple[str, str]]:
-        """File and key of each result that it is to make."""
+        """File and key of each result that the job makes."""
         return {(file["name"], task["key"]) for file in self.content["files"] for task in file["tasks"]}
 
     def write(self) -> None:
-        """Write the note that a job of a stage reads; an unchanged one stays."""
+        """Write the tasks for the process of the job; an unchanged file is not written."""
         if self.stage and read_note(self.tasks).get("digest") != self.digest:
             note = {"digest": self.digest, "module": self.stage.module, "products": self.products}
             note["checksum"] = hash_of(self.stage.module, self.content)
@@ -77,7 +77,7 @@ class Job:
 
 
 def share_out(seconds: Mapping[str, float]) -> dict[str, list[str]]:
-    """Share tasks out in bundles of about equal work, the more the longer they take.
+    """Share tasks out in bundles of about equal work; more work makes more bundles.
 
     >>> share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0})
     {'0': ['fine'], '1': ['coarse', 'middle']}
@@ -111,7 +111,7 @@ def stage_jobs(study: Study, folder: Path) -> dict[str, Job]:
                 named[task.name or hash_of(task.values)].append(task)
             if not stage.like:
                 seconds = {name: sum(task.seconds for task in own) for name, own in named.items()}
-                bundles[stage.name] = {name: [name] for name in named} if stage.alone else share_out(seconds)
+                bundles[stage.name] = {name: [name] for name in named} if stage.timed else share_out(seconds)
     for stage in stages():
         for label, names in bundles.get(stage.like or stage.name, {}).items():
             if own := [task for name in names for task in tasks[stage.name].get(name, ())]:
@@ -124,7 +124,7 @@ def _job(stage: Stage, folder: Path, label: str, tasks: Sequence[Task]) -> Job:
     for task in tasks:
         key = task.key_of(stage)
         name, shared = task.file or key, id(task.shared)
-        if (name, shared) not in seen:  # a text of what is shared takes longer than the rest
+        if (name, shared) not in seen:  # by id(): a text of the shared values takes longer than the rest
             seen[name, shared] = files.setdefault((name, repr(task.shared)), {"name": name, **task.shared, "tasks": {}})
         seen[name, shared]["tasks"][key] = {"key": key, **task.values}
     content = {
@@ -243,24 +243,24 @@ def paper_job(source: Path, datasets: Iterable[Path], folder: Path) -> Job:
     return Job(folder, PAPER, digest, (str(folder / PAPER_FILE),), tuple(map(str, datasets)))
 
 
-MISSING = " is missing"  # end of the reason of a missing product
+MISSING_ENDING = " is missing"  # end of the reason of a missing product
 
 
 def rerun_reason(job: Job) -> str:
-    """Return why a job must run, or an empty string; jobs before it count only by their products."""
+    """Return why a job must run, or an empty string; of other jobs it looks at products alone."""
     if not job.record.exists():
         return "not done yet"
     if read_note(job.record).get("digest") != job.digest:
         return "its parameters, code or packages changed"
     for product in job.products:
         if not Path(product).exists():
-            return f"{product}{MISSING}"
+            return f"{product}{MISSING_ENDING}"
     made = job.record.stat().st_mtime_ns
     newer = (path for path in map(Path, job.reads) if path.exists() and path.stat().st_mtime_ns > made)
     return next((f"{path} is newer" for path in newer), "")
 
 
-def outdated(study: Study, folder: Path) -> dict[Path, str] | None:
+def outdated_records(study: Study, folder: Path) -> dict[Path, str] | None:
     """Return the records of done jobs that must run again, with the reasons; None if a job was never done."""
     if not (folder / TASKS).exists():  # never run: planning 10,000 scenes takes a second
         return None

@@ -29,7 +29,7 @@ class DamagedError(Exception):
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the damaged file."""
         return Path(self.args[0])
 
     def __str__(self) -> str:

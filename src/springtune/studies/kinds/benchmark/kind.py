@@ -12,7 +12,7 @@ from springtune.reference.calculix import program
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import check_able, check_particles, check_product, check_scene
+from ...config.checks import check_fit, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
 from ...config.model import Output, Stage, StudyKind, declared
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -90,7 +90,7 @@ def _check(config, problems):
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)
         check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
-    check_able(problems, ("benchmark", "definition"), section.definition)
+    check_fit(problems, ("benchmark", "definition"), section.definition)
     approaches = approach_names(section.definition, section.mesh_type, section.approach)
     for name in section.finest_of:
         if name not in approaches:
@@ -151,7 +151,7 @@ KIND = StudyKind(
     axes=_axes,
     summary=lambda part: [["benchmark", len(part), "cases, timed one by one"]],
     **declared(__file__),
-    stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
+    stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, timed=True),),
     outputs=(Output("benchmark", "run time against error", _figures, plot=f"{PLOTS}:benchmark", shows="a benchmark"),),
     tables=lambda study: ["benchmark", "explicit_steps"] if study.parts["benchmark"] else [],
 )

@@ -17,8 +17,8 @@ from springtune.mechanics import PRECISIONS
 from springtune.mechanics.stepping import make_stepper
 from springtune.mesh.cells import MESH_TYPES
 from springtune.mesh.rows import structured
-from springtune.problem.boundary import held, measured, weights
-from springtune.problem.compare import assured, deformation_error
+from springtune.problem.boundary import held_directions, measured_weights, weights
+from springtune.problem.compare import deformation_error, largest_finer_errors
 from springtune.problem.loads import LOADS, LoadKind
 from springtune.problem.materials import Material, material_of
 from springtune.problem.quantities import Status
@@ -103,7 +103,7 @@ def measure(scene, cases, most_seconds):
         rows[approach].append(case | found)
     for own in rows.values():
         errors = np.array([[row["error"] for row in reversed(own)]])
-        for row, error in zip(reversed(own), assured(errors)[0].tolist()):
+        for row, error in zip(reversed(own), largest_finer_errors(errors)[0].tolist()):
             row["assured_error"] = error
     about = {
         "reference_displacement": reference.displacement,
@@ -283,7 +283,7 @@ def tensor_mass(scene, size, clock):
             ordered = (mesh.triangles[:, j] < mesh.triangles[:, k])[:, None, None]
             np.add.at(of_edges, mesh.cell_edges[3][:, i], np.where(ordered, tensor(j, k), tensor(k, j)))
         first, second = mesh.edges.T
-        moving = ~held(mesh, scene.kind)
+        moving = ~held_directions(mesh, scene.kind)
         load = scene.force * weights(mesh, scene.kind) * moving
         diagonal = np.einsum("nii->ni", of_particles)
 
@@ -303,7 +303,7 @@ def tensor_mass(scene, size, clock):
         u, left = cg(stiffness, load.ravel(), rtol=1e-8, maxiter=20 * len(load), M=inverse)
         if left:
             raise ArithmeticError("conjugate gradients did not end")
-    return float(np.tensordot(u.reshape(load.shape), measured(mesh, scene.kind), axes=2)), int(moving.sum())
+    return float(np.tensordot(u.reshape(load.shape), measured_weights(mesh, scene.kind), axes=2)), int(moving.sum())
 
 
 def condensation(scene, size, clock):
@@ -408,16 +408,16 @@ def free_form(scene, size, clock):
         basis = np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=1)
         moved = np.zeros(mesh.points.shape)
         moved[:, kind.axis] = scene.force * given * basis @ control
-    return float(np.tensordot(moved, measured(mesh, kind), axes=2)), 8
+    return float(np.tensordot(moved, measured_weights(mesh, kind), axes=2)), 8
 
 
 def calculix_cps3(scene, size, clock):
     """Solve by CalculiX with linear triangles on the same mesh."""
     mesh = _mesh(scene, size, clock)
-    load, clamp = scene.force * weights(mesh, scene.kind), held(mesh, scene.kind)
+    load, clamp = scene.force * weights(mesh, scene.kind), held_directions(mesh, scene.kind)
     with clock("solving"):
         found = calculix.solve(mesh.points, mesh.triangles, "CPS3", scene.material, scene.beam.thickness, load, clamp)
-    return float(np.tensordot(found, measured(mesh, scene.kind), axes=2)), int((~clamp).sum())
+    return float(np.tensordot(found, measured_weights(mesh, scene.kind), axes=2)), int((~clamp).sum())
 
 
 def calculix_cps8(scene, size, clock):

@@ -11,13 +11,13 @@ from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT, with_unit
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.model import distinct
+from ...config.model import distinct_cells
 from ...output import style
 from ...output.answers import plane_vectors, status_words
 from ...output.dataset import SHOWN_PREFIX, cells, choose, group, in_own_plane, labels_of, own_laws, sign_of_errors
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
 from .shape_figures import draw_network, extent, magnification
-from .tables import at, labelled_beam, last_swept, own_references
+from .tables import at, beam_title, last_swept, own_references
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 
@@ -33,7 +33,7 @@ def sensitivity(tree):
 
 def selections(name, present, labels=SCENE_LABELS):
     """Stem and labels of each figure with cells."""
-    return distinct(name, labels, cells(present, labels)).items()
+    return distinct_cells(name, labels, cells(present, labels)).items()
 
 
 USUAL_KINEMATICS = "nonlinear"
@@ -48,7 +48,7 @@ def usual_kinematics(present):
 
 @style.styled
 def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"):
-    """Deformation error against uniform stiffness, a line a mesh size, as in figures 7 and 8 of the paper.
+    """Deformation error against uniform stiffness, one line per mesh size, as in figures 7 and 8 of the paper.
 
     Marks show where each curve is lowest and where the stiffness of its lattice predicts that. Unstable equilibria are
     thin.
@@ -153,7 +153,7 @@ LEGEND = {
 def _sensitivity_title(panel, root, selection, swept):
     shown = dict(selection)
     if root is not None and "beam" in shown:
-        shown["beam"] = labelled_beam(root, shown["beam"])
+        shown["beam"] = beam_title(root, shown["beam"])
     words = [*title_labels(shown, "beam", "mesh_type", "material", "load"), *swept]
     first = style.wrap_to_panel(panel, [", ".join(words)], 8)
     if root is None:
@@ -180,7 +180,7 @@ def swept_words(values):
 def _beam_title(root, name, values):
     """Title of a beam with its swept values."""
     own = {one: value.sel(beam=name) for one, value in values.items()}
-    return ", ".join([labelled_beam(root, name), *swept_words(own)])
+    return ", ".join([beam_title(root, name), *swept_words(own)])
 
 
 def title_labels(selection, *names):
@@ -205,7 +205,7 @@ def by_beam(root, beam, mesh_type, material, load, kinematics):
 
 
 def in_usual_kinematics(root):
-    """Cells of each definition in its usual kinematics, named if they are not those of the figure, and the latter."""
+    """Return cells with each definition in its usual kinematics, and the kinematics of the figure; others are named."""
     present = root.status != 0
     whole, names = usual_kinematics(present), labels_of(present, "definition")
     own = [usual_kinematics(present.sel(definition=name)) for name in names]
@@ -237,7 +237,7 @@ def deformed(tree):
 def plot_deformed(
     data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, definition=None, kinematics="nonlinear"
 ):
-    """Deformed network over the deformed reference, a panel a beam, displacements magnified.
+    """Deformed network over the deformed reference, one panel per beam, displacements magnified.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def plot_deformed(
     >>> axes[0].figure.get_suptitle()
     'structured, steel, traction'
     """
-    fields, root = group(data, "fields", alone=False), group(data, "/")
+    fields, root = group(data, "fields", needs_tree=True), group(data, "/")
     kept = fields.definition.values.tolist()
     definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
     cut, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
@@ -276,17 +276,17 @@ def plot_deformed(
     shown = {_beam_title(root, name, values): (fields.sel(beam=name), cut.sel(beam=name)) for name in beams}
     extents = [extent(plane_vectors(part, "outline_{}"), (5.0, 1.0)) for part, _ in shown.values()]
     height = max(float(np.clip((style.PAGE_WIDTH - 0.5) * high / wide, 0.45, 2.4)) for wide, high in extents)
-    said = f"lines: network ({definition}); grey: reference; dashed: at rest"
+    note = f"lines: network ({definition}); grey: reference; dashed: at rest"
     title = ", ".join(title_labels(selection, "mesh_type", "material", "load"))
-    return style.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, said=said)
+    return style.small_multiples(ax, shown, 1, 0.75 + height, title, _draw_deformed, note=note)
 
 
 def _draw_deformed(panel, part):
     """Draw the network of a beam; return notes."""
     fields, root = part
     # Of the meshes that this beam has, the one that this load is asked for on.
-    wanted = fields.displacement_x, fields.x.where(root.status != 0), fields.x
-    places = (np.flatnonzero(known.notnull().any("particle").values) for known in wanted)
+    variables = fields.displacement_x, fields.x.where(root.status != 0), fields.x
+    places = (np.flatnonzero(known.notnull().any("particle").values) for known in variables)
     here = fields.isel(mesh_size=next(filter(len, places), [0])[-1])
     scale, flag = magnification(here), int(root.status.sel(mesh_size=here.mesh_size.values))
     draw_network(panel, here, scale)
@@ -295,7 +295,7 @@ def _draw_deformed(panel, part):
     beyond = [f"reference {style.BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
     notes = beyond if here.reference_displacement_x.notnull().any() else ["no reference"]
     if not here.displacement_x.notnull().any():
-        notes.append(f"no network: {status_words(flag) or 'not asked for'}" if flag != 1 else "no network stored")
+        notes.append(f"no network: {status_words(flag) or 'not requested'}" if flag != 1 else "no network stored")
     elif flag not in (0, 1):
         notes.append(status_words(flag))
     return notes, ""
@@ -323,16 +323,16 @@ def _draw_panels(ax, root, selection, beams, draw):
 
     def drawn(panel, part):
         panel.set_ylabel("Deformation error [%]")
-        said = draw(panel, *part)
-        return said, f"no errors: {'; '.join(said)}"
+        notes = draw(panel, *part)
+        return notes, f"no errors: {'; '.join(notes)}"
 
-    columns, said = 2 if len(shown) == 4 else 3, sign_of_errors(root)
-    return style.small_multiples(ax, shown, columns, 2.1, ", ".join(title), drawn, sharey=True, said=said)
+    columns, note = 2 if len(shown) == 4 else 3, sign_of_errors(root)
+    return style.small_multiples(ax, shown, columns, 2.1, ", ".join(title), drawn, sharey=True, note=note)
 
 
 def _draw_lines(panel, places, here, looks, listed, gaps):
-    """Draw a line a definition over ``places``, hollow where its error is doubtful; return notes."""
-    said, doubts = [], set()
+    """Draw one line per definition over ``places``, hollow where its error is doubtful; return notes."""
+    notes, doubts = [], set()
     for x, (name, look) in zip(places, looks.items()):
         cell = here.sel(definition=name)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
@@ -347,9 +347,9 @@ def _draw_lines(panel, places, here, looks, listed, gaps):
         for place, flag in zip(np.flatnonzero(~known), flags[~known]):
             if flag:
                 lost.setdefault("no reference" if flag == 1 else status_words(flag), []).append(place)
-        said += [f"{name}, {listed(numbers)}: {reason}" for reason, numbers in lost.items()]
+        notes += [f"{name}, {listed(numbers)}: {reason}" for reason, numbers in lost.items()]
     panel.axhline(0, color="0.3", linewidth=0.7, zorder=1)
-    return [f"hollow: {', '.join(sorted(doubts))}", *said] if doubts else said
+    return [f"hollow: {', '.join(sorted(doubts))}", *notes] if doubts else notes
 
 
 # -- against mesh size -------------------------------------------------------------------------------------------------
@@ -363,7 +363,7 @@ def size(tree):
 
 @style.styled
 def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics=None):
-    """Deformation error against mesh size, a panel a beam, a line a definition.
+    """Deformation error against mesh size, one panel per beam, one line per definition.
 
     Parameters
     ----------
@@ -422,13 +422,13 @@ def _draw_over_sizes(panel, here, looks):
     def listed(numbers):
         return f"{', '.join(f'{sizes[number]:g}' for number in numbers)} mm"
 
-    said = _draw_lines(panel, places, here, looks, listed, True)
+    note = _draw_lines(panel, places, here, looks, listed, True)
     if "paper_displacement" in here:
         printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
         if (here.force < 0).all():  # printed without sign
             printed = -printed
         panel.plot(places[0], printed, "x", color="0.35", markersize=4.5, label="as printed")
-    return said
+    return note
 
 
 # -- against what is swept ---------------------------------------------------------------------------------------------
@@ -461,7 +461,7 @@ def plot_sweep(
     load=None,
     kinematics="nonlinear",
 ):
-    """Deformation error against a parameter that the study sweeps, a panel a beam, a line a definition.
+    """Deformation error against a swept parameter, one panel per beam, one line per definition.
 
     Parameters
     ----------
@@ -507,7 +507,7 @@ def plot_sweep(
 
 
 def _most_values(present, parameter):
-    """Largest number of values of a parameter on one beam."""
+    """Return the largest number of values that a parameter takes on one beam."""
     return int(present.any([name for name in present.dims if name not in ("beam", parameter)]).sum(parameter).max())
 
 
@@ -528,7 +528,7 @@ def _errors_of_beam(root, name, parameter, mesh_size):
         size = max(sizes, key=lambda one: (counts[one], -one)) if mesh_size is None else mesh_size
         here, meshes = here.sel(mesh_size=size), f"mesh {1e3 * size:g}\u00a0mm"
     values = last_swept(here.status != 0, parameter)
-    words = ", ".join([labelled_beam(root, name), meshes, *swept_words(values)])
+    words = ", ".join([beam_title(root, name), meshes, *swept_words(values)])
     return words, at(here, values)
 
 
@@ -609,7 +609,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     >>> axes[0].figure.get_suptitle()
     '200x40 mm, structured 1 mm, rubber'
     """
-    faces, root = group(data, "block", alone=False), group(data, "/")
+    faces, root = group(data, "block", needs_tree=True), group(data, "/")
     asked = root.status != 0
     load = _pressing_load(labels_of(asked, "load"))
     chosen = choose(asked.sel(load=[load]), beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
@@ -617,7 +617,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     size = 1e3 * chosen["mesh_size"]
     here = root.sel(chosen)
     values = last_swept(here.status != 0)
-    words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
+    words = [beam_title(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
     words += swept_words({name: value.sel(load=load) for name, value in values.items()})
     style.add_title(figure, ", ".join(words))
     (left, right), here, faces = axes[0], at(here, values), at(faces.sel(chosen), values)
@@ -636,9 +636,9 @@ def _draw_errors_over_stiffness(panel, curves, root):
     curves = curves.sel(kinematics="linear")
     asked = labels_of(curves.status != 0, "load")
     loads = [load for load in asked if curves.deformation_error.sel(load=load).notnull().any()]
-    said = [f"{load}: no error" for load in asked if load not in loads]
+    notes = [f"{load}: no error" for load in asked if load not in loads]
     if not loads:
-        return [], "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
+        return [], "No uniform stiffness has an error: " + ("; ".join(notes) or "the study has no curves") + "."
     known = curves.stiffness.values[np.isfinite(curves.stiffness.values)]
     for number, load in enumerate(loads):
         draw_curve(panel, curves.sel(load=load), 1.0, load, style.line(number), known)
@@ -654,7 +654,7 @@ def _draw_errors_over_stiffness(panel, curves, root):
             worst, look = errors.max(), style.line(len(loads) + number) | {"marker": ""}
             panel.plot([low, high], [worst, worst], label=f"{name}, worst: {worst:.2g} %", **look)
         else:
-            said.append(f"{name}: not solved for all loads")
+            notes.append(f"{name}: not solved for all loads")
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
     stated = networks.stiffness.sel(definition=networks.definition == "paper").values
     for value in np.unique(stated[np.isfinite(stated)]):
@@ -667,12 +667,12 @@ def _draw_errors_over_stiffness(panel, curves, root):
         mark_stiffness(panel, middle, f"by closed form: {middle:.4g}", 1)
         if low < held < high and abs(held / middle - 1) > 0.02:
             mark_stiffness(panel, held, f"the same, sides held: {held:.4g}", 3)
-    return said, ""
+    return notes, ""
 
 
 def _draw_pressed_face(panel, block, root, load):
     """Draw the pressed face over the reference of its kinematics; return notes, and the reason if nothing is drawn."""
-    x, pressed, said = block.face_position.values, block.sel(load=load), []
+    x, pressed, notes = block.face_position.values, block.sel(load=load), []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     solved = pressed.face_profile.notnull().any("face_position")
     laws, own = own_laws(pressed), in_own_plane(pressed).reference_face_profile
@@ -691,11 +691,11 @@ def _draw_pressed_face(panel, block, root, load):
             profiles[f"{definition}, {drawn[0]}"] = own
         else:
             flags = root.status.sel(load=load, definition=definition, kinematics=usual).values
-            said.append(f"{definition}: {'in the dataset' if drawn else status_words(flags) or 'not asked for'}")
+            notes.append(f"{definition}: {'in the dataset' if drawn else status_words(flags) or 'not requested'}")
     looks = [{"color": "0.72", "linewidth": 3}, *(style.line(number) | {"marker": ""} for number in range(MOST_FACES))]
     for (name, profile), look in zip(profiles.items(), looks):
         panel.plot(x, -1e3 * profile.values, label=name, **look)
     if not finite and any(name.endswith("nonlinear") for name in profiles):
-        said.append("the reference is of small strain, not all networks are: add further_references")
+        notes.append("the reference is of small strain, not all networks are: add further_references")
     panel.margins(x=0.02, y=0.08)
-    return said, "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
+    return notes, "No network is solved and there is no reference: " + "; ".join(notes or ["nothing was requested"])

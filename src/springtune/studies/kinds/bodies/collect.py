@@ -12,7 +12,7 @@ from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
-from springtune.problem.quantities import OF_BODIES, SWEPT, Status
+from springtune.problem.quantities import BODY_NAMES, SWEPT, Status
 from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
@@ -22,7 +22,7 @@ from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING
 from ...runs import store
 from . import any_reference, stored
 from . import kind as bodies
-from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, pressed
+from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, has_pressure
 from .stored import FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
 
@@ -57,7 +57,7 @@ MIXED_UNITS: dict[str, object] = {
 }
 
 SHAPES = _group("/shapes", value=MIXED_UNITS, reference_value=MIXED_UNITS, expected_value=MIXED_UNITS)
-AT_FINITE_STRAIN = _group("/shapes_finite_strain", reference_value=MIXED_UNITS)
+SHAPES_FINITE_STRAIN = _group("/shapes_finite_strain", reference_value=MIXED_UNITS)
 SHAPE_FIELDS = _group("/shape_fields", **MESH_ATTRIBUTES)
 """Networks to draw: of each shape and load on one mesh, displacements and forces with seven digits."""
 
@@ -65,11 +65,11 @@ PRINTED_PREFIX = "paper_"  # prefix of variables of printed cells, which have no
 
 
 def swept(group: Group, study: Study) -> Group:
-    """Group whose variables also have the swept dimensions that they depend on."""
+    """Return a group whose variables have further dimensions: the swept parameters that they depend on."""
     further: dict[str, list[str]] = {}
     for name, (dimensions, *_) in group.variables.items():
-        if name in OF_BODIES.values():
-            further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
+        if name in BODY_NAMES.values():
+            further[name] = [one for one in study.swept if BODY_NAMES.get(one) == name]
         elif "load" in dimensions and not name.startswith(PRINTED_PREFIX):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
     found = group.over(further, without={"force"} & {*study.swept} if group is ROOT else ())
@@ -171,7 +171,7 @@ def _beam_groups(study, folder):
         rows, group = [*planes, *_finite_reference_rows(study, folder)], swept(FINITE_STRAIN, study)
         finite = found["/finite_strain"] = group.of_rows(axes | {"reference": study.further_references}, rows)
         _write_errors(finite.deformation_error, data.displacement, finite.reference_displacement)
-    if pressed(study):
+    if has_pressure(study):
         in_plane = {one["material_plane"] for one in planes}
         small = f"small-strain-plane-{in_plane.pop()}" if len(in_plane) == 1 else "small-strain"
         kinds, group = (small, *study.further_references), swept(BLOCK, study)
@@ -239,7 +239,7 @@ def _scene_rows(study, folder, answers):
     cells, faces, fields = [], [], []
     for mesh, tasks in bodies.scene_tasks(study).items():
         keys, path = [stored_key(task, calibration) for task in tasks], folder / "solutions" / f"{bodies.stem(mesh)}.h5"
-        results = store.read(path, set(keys), ["face_profile"] if pressed(study) else [])
+        results = store.read(path, set(keys), ["face_profile"] if has_pressure(study) else [])
         kept = {fields_key(key) for task, key in zip(tasks, keys) if keeps_fields(study) and "keep_fields" in task}
         arrays = store.read(path, kept, [*FIELD_ARRAYS]) if kept else {}
         for scene, key in zip(bodies.by_mesh(study, "scenes")[mesh], keys):
@@ -270,7 +270,7 @@ def _curve_rows(study, folder, answers):
         results = store.read(path, [task["key"] for task in tasks], ["displacement", "stable"])
         for curve, task in zip(curves, tasks):
             result, reference = results[task["key"]], Reference(mesh.beam, curve.material, curve.load, curve.force)
-            displacement, wanted = result["displacement"], curve.force * answers[reference].get("displacement", np.nan)
+            displacement, answer = result["displacement"], curve.force * answers[reference].get("displacement", np.nan)
             status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
             row = {name: result[name] for name in ("displacement", "message", "best_stiffness")} | study.labels(curve)
             row |= {f"best_stiffness_{name}": result[f"best_{name}"] for name in ("status", "message")}
@@ -278,7 +278,7 @@ def _curve_rows(study, folder, answers):
                 "stiffness": np.array(task["stiffnesses"]),
                 "status": np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status),
                 "curve_seconds": result["seconds"],
-                "deformation_error": deformation_error(displacement, wanted),
+                "deformation_error": deformation_error(displacement, answer),
                 "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
             }
 
@@ -402,7 +402,7 @@ def _shapes_at_finite_strain(study, folder, values):
             error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
             rows.append(labels | {"error": error})
     laws = tuple(dict.fromkeys(law for *_, law in shapes.finite))
-    return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
+    return SHAPES_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
 def _rows_of_reference(shapes, labels, result, objection=""):

@@ -81,11 +81,11 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
     """Interpolants of a study by kind of load: box, and unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
-    wanted = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
+    with_fields = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
     if keeps_fields(study):
-        wanted += shown_scenes(study)
+        with_fields += shown_scenes(study)
     # Bodies and loads that share a unit problem share its solution, too.
-    whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}
+    whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in with_fields}
     kinds: dict[str, dict[Body, tuple[float, float]]] = {}
     for body in dict.fromkeys((one.beam, one.material, one.load) for one in study.references):
         beam, material, load = body
@@ -179,7 +179,7 @@ def _reference_code(*without):
     return stage_key("studies.kinds.bodies.reference", without=(*REFERENCES_OF_SHAPES, *without))
 
 
-NOT_OF_BEAMS = (TASK_VALUES, "reference.small_strain", *FINITE_STRAIN, "reference.shapes")
+SHAPE_MODULES = (TASK_VALUES, "reference.small_strain", *FINITE_STRAIN, "reference.shapes")
 """Modules that the stage `solve` imports, but scenes of beams do not call."""
 
 
@@ -236,7 +236,7 @@ def _scene_tasks(study, mesh, scenes):
         if scene.definition == "calibrated":  # stiffness is proportional to thickness
             group = calibration_name(scene)
             further["calibration"] = calibrations(study)[group].key
-            own["thickness_ratio"] = mesh.beam.thickness / calibrating(study)[group][0].mesh.beam.thickness
+            own["thickness_ratio"] = mesh.beam.thickness / calibration_curves(study)[group][0].mesh.beam.thickness
         # As a text: JSON of 100,000 scenes takes a third of a second.
         yield {**task, **own, **further, "key": hash_of_text(f"{key} {own}")}
 
@@ -254,7 +254,7 @@ def _network_task(study, mesh, material, load, definition, kinematics):
     reference = reference_of(study, mesh.beam, material, load)
     if "interpolant" not in reference:  # which has no field, all that a scene wants of it
         task["reference"] = reference
-    code = stage_key("studies.kinds.bodies.solve", without=NOT_OF_BEAMS), definition_key(definition)
+    code = stage_key("studies.kinds.bodies.solve", without=SHAPE_MODULES), definition_key(definition)
     return task, hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
 
 
@@ -278,7 +278,7 @@ def shown_scenes(study):
 
 
 @cache_by_study
-def calibrating(study):
+def calibration_curves(study):
     """Curves that calibrate each group of scenes."""
     chosen = (one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration)
     return group_by(chosen, calibration_name)
@@ -296,7 +296,7 @@ def calibrations(study):
     for name in sorted({calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}):
         members = [
             {"mesh": stem(one.mesh), "curve": curve_task(study, one)["key"], "load": one.load, "force": one.force}
-            for one in calibrating(study)[name]
+            for one in calibration_curves(study)[name]
         ]
         found[name] = Task({"members": members}, name="all", file=CALIBRATION_STEM, key=hash_of(members, code))
     return found
@@ -451,14 +451,14 @@ def _solve_tasks(study):
             yield Task(task, name=name, file=name, shared=shared, key=task["key"])
 
 
-UNKEYED = "keep_fields", "calibration"  # values of scenes that are not in their keys
+UNKEYED_VALUES = "keep_fields", "calibration"  # values of scenes that are not in their keys
 
 STAGES = (
     Stage("reference", "studies.kinds.bodies.reference", _reference_tasks, "references"),
     Stage("mesh", "studies.kinds.bodies.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
     Stage("sensitivity", "studies.kinds.bodies.sensitivity", _curve_tasks, "curves", like="mesh"),
     Stage("calibrate", "studies.kinds.bodies.calibrate", lambda study: calibrations(study).values(), "curves"),
-    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh", unkeyed=UNKEYED),
+    Stage("solve", "studies.kinds.bodies.solve", _solve_tasks, "solutions", like="mesh", unkeyed=UNKEYED_VALUES),
 )
 
 
@@ -512,7 +512,7 @@ def _files(found):
 KIND = StudyKind(
     "bodies",
     study_fields={"shapes": of_shapes.SHAPES_KEY, "shape_grids": of_shapes.SHAPE_GRIDS_KEY},
-    alone=("shape_grids",),
+    instead_of_grids=("shape_grids",),
     reads=("grids",),
     files=_files,
     check=of_shapes.check,

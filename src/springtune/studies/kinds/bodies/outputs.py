@@ -8,7 +8,7 @@ from typing import Any
 
 from springtune.problem.loads import LOADS
 
-from ...config.model import Output, Study, cache_by_study, distinct
+from ...config.model import Output, Study, cache_by_study, distinct_cells
 from ...config.model import stem as figure_stem
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
@@ -42,18 +42,18 @@ def stems(study: Study) -> list[str]:
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
     found = [stem(dict(zip(TABLE_LABELS, labels)), numbers.get(labels)) for labels in chosen]
-    further = {"finite_strain": study.further_references, "block": pressed(study), "shapes": study.shapes}
+    further = {"finite_strain": study.further_references, "block": has_pressure(study), "shapes": study.shapes}
     return found + [name for name, there in further.items() if there]
 
 
 @cache_by_study
-def pressed(study: Study) -> bool:
+def has_pressure(study: Study) -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)
 
 
 def _lack_of_pressure(study: Study) -> str:
-    return "" if pressed(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
+    return "" if has_pressure(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
 
 
 def _sweeps(study: Study) -> dict[str, Mapping[str, object]]:
@@ -63,7 +63,7 @@ def _sweeps(study: Study) -> dict[str, Mapping[str, object]]:
         place = itemgetter(*SCENE_LABELS, "kinematics", "beam", name)
         counts = Counter(values[:-1] for values in dict.fromkeys(map(place, map(study.labels, study.scenes))))
         several = [dict(zip(SCENE_LABELS, values)) for values, count in counts.items() if count > 1]
-        found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
+        found |= distinct_cells(f"sweep_{name}", SCENE_LABELS, several)
     return found
 
 
@@ -99,7 +99,7 @@ def _figures_of_shapes(study: Study) -> dict[str, dict[str, str]]:
 
 def _of_scenes(name: str) -> Callable[[Study], dict[str, dict[str, str]]]:
     """Figures of the scenes of each mesh type, material and load."""
-    return lambda study: distinct(name, SCENE_LABELS, map(study.labels, study.scenes))
+    return lambda study: distinct_cells(name, SCENE_LABELS, map(study.labels, study.scenes))
 
 
 SceneOutput = partial(Output, job="scenes", usual=True)
@@ -108,7 +108,7 @@ OUTPUTS = (
     SceneOutput(
         "sensitivity",
         "sensitivity curves",
-        lambda study: distinct("sensitivity", SENSITIVITY_LABELS, map(study.labels, study.curves)),
+        lambda study: distinct_cells("sensitivity", SENSITIVITY_LABELS, map(study.labels, study.curves)),
         plot=f"{PLOTS}:sensitivity",
         job="sensitivity",
     ),

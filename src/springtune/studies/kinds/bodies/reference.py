@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from springtune.problem.loads import LOAD_KINDS
-from springtune.problem.materials import Rubber, material_of, of_parts
+from springtune.problem.materials import Rubber, material_of, materials_by_part
 from springtune.problem.shapes import Beam
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_unit
 
@@ -98,7 +98,7 @@ def make_interpolant(path, task, attempts):
 
 
 def _build_interpolant(task):
-    """Arrays of an interpolant within its tolerance or that of references, or the reason why there is none."""
+    """Arrays of an interpolant within its tolerance or that of references, or the reason if it cannot be built."""
     # Here, since few studies need it.
     from springtune.reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError
 
@@ -130,7 +130,7 @@ def _solve_shape(task):
     grouped = make_shape(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
     try:
-        materials = of_parts(materials, parts_of(grouped)) if grouped else materials
+        materials = materials_by_part(materials, parts_of(grouped)) if grouped else materials
     except ValueError as error:  # of a file that is too large to be checked before
         return {"message": str(error)}
     case = shape.loads[LOAD_NAME]

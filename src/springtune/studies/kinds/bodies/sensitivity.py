@@ -11,7 +11,7 @@ import numpy as np
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.quantities import Status
 from springtune.reference.answers import objection
-from springtune.scene.curve import ending, follow, meeting
+from springtune.scene.curve import follow, incomplete_reason, meeting_stiffness
 from springtune.scene.mesh_cache import MeshCache
 
 from . import any_reference, stored
@@ -20,7 +20,7 @@ from . import any_reference, stored
 def prepare(file, content):
     """Cache of a mesh, and the folder of references."""
     # Curves depend on stiffnesses alone, so the thickness is 1 m.
-    return MeshCache(stored.prepared(content, file).mesh, 1.0), Path(content["results"]) / "references"
+    return MeshCache(stored.prepared_mesh(content, file).mesh, 1.0), Path(content["results"]) / "references"
 
 
 def failed(curve, why):
@@ -37,11 +37,11 @@ def solve(curve, shared):
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
     path = follow(cache, LOAD_KINDS[curve["kind"]], curve["kinematics"], force / stiffness)
     reference = any_reference.read(folder, curve["reference"])
-    why, wanted = objection(reference, force, curve["kinematics"]), force * reference.get("displacement", np.nan)
-    best = meeting(path, force, stiffness, wanted, why)
+    why, target = objection(reference, force, curve["kinematics"]), force * reference.get("displacement", np.nan)
+    best = meeting_stiffness(path, force, stiffness, target, why)
     return {f"best_{name}": getattr(best, name) for name in ("stiffness", "status", "message")} | {
         "displacement": path.values,
         "stable": path.stable,
-        "message": ending(path, force),
+        "message": incomplete_reason(path, force),
         "seconds": time.perf_counter() - begin,
     }

@@ -37,7 +37,7 @@ def shapes(tree):
 
 @style.styled
 def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, kinematics=None):
-    """Error of each quantity of a shape over particles and over seconds: a line a definition.
+    """Error of each quantity of a shape over particles and over seconds, one line per definition.
 
     Errors are against the reference, or else the expected value. Hollow markers: unstable, or beyond the reference.
 
@@ -79,7 +79,7 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     for panels, name in zip(axes, names):
         _draw_errors(panels, cut, name, points[name])
     for panel in axes.flat if not names else ():
-        style.write_reason(panel, "No quantity was asked for.")
+        style.write_reason(panel, "No quantity was requested.")
     return axes
 
 
@@ -148,13 +148,13 @@ def _draw_errors(panels, cut, name, points):
     panels[1].set_ylabel("")
     style.add_legend(panels[1])
     panels[0].set_title(f"{name}: {described(cut, name)}")
-    said = [f"{difference:.2g} % from expected"] if difference > 0 else []
-    said += [f"known to {estimate:.1g} %"] if estimate > 0 else []
-    panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL_TEXT)
+    facts = [f"{difference:.2g} % from expected"] if difference > 0 else []
+    facts += [f"known to {estimate:.1g} %"] if estimate > 0 else []
+    panels[1].set_title(f"reference: {', '.join(facts)}" if facts else "over seconds", fontsize=style.SMALL_TEXT)
 
 
 def _reason_without_error(cut):
-    states = status_words(cut.status.values) or "not asked for"
+    states = status_words(cut.status.values) or "not requested"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     return f"No error: {states}. {message[:160] or 'There is neither a reference nor an expected value.'}"
 
@@ -164,7 +164,7 @@ def _reason_without_error(cut):
 
 @style.styled
 def plot_shapes(data, ax=None, *, material=None, kinematics=None):
-    """Size of the error of each quantity of all shapes on their finest mesh: a row a quantity, a column a definition.
+    """Size of the error of each quantity of all shapes on their finest mesh, by quantity and definition.
 
     Parameters
     ----------
@@ -202,8 +202,8 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
         style.write_reason(panel, "No quantity has an error: see status and message.")
         return panel
     texts = style.heat_map(panel, errors, asked)
-    said = {style.NO_RESULT: "no result that counts", style.NOT_ASKED: "not asked for"}
-    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if (texts == mark).any()))
+    meanings = {style.NO_RESULT: "no result that counts", style.NOT_REQUESTED: "not requested"}
+    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in meanings.items() if (texts == mark).any()))
     return panel
 
 
@@ -232,7 +232,7 @@ def _errors_by_quantity(whole, material, kinematics):
 
 
 def extent(places, nothing):
-    """Width and height of points, shape (n, 2), without NaN; `nothing` if they have no extent."""
+    """Width and height of the box around points (n, 2), NaN left out; `nothing` if no point is left."""
     known = places[np.isfinite(places).all(axis=1)]
     wide, high = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
     return (float(wide), float(high)) if min(wide, high) > 0 else nothing
@@ -319,36 +319,36 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     >>> axes[0].get_title(loc="left")
     'area'
     """
-    fields, scenes = group(data, "shape_fields", alone=False), group(data, "shapes")
+    fields, scenes = group(data, "shape_fields", needs_tree=True), group(data, "shapes")
     names = list(zip(fields.shape_name.values.tolist(), fields.load_name.values.tolist()))
     here = [i for i, one in enumerate(names) if shape in (None, one[0]) and load in (None, one[1])]
     if len(here) != 1:
-        what = "choose one shape and load" if here else "nothing has this shape and load; there is"
+        what = "choose one shape and load" if here else "no network to draw has this shape and load; choose"
         raise ValueError(f"{what}: {'; '.join(map(', '.join, names))}")
     case = fields.isel(case=here[0])
     about = {name: str(case[f"{name}_name"].item()) for name in ("shape", "load", "material", "kinematics")}
     mesh = {"mesh_type": str(case.mesh_type_name.item()), "mesh_size": float(case.case_mesh_size)}
     cut = scenes.sel(about | mesh)
     asked = labels_of(cut.status != 0, "definition")
-    wanted = [definition] if isinstance(definition, str) else definition or _choose_definitions(cut, asked)
-    for name in wanted:
+    drawn = [definition] if isinstance(definition, str) else definition or _choose_definitions(cut, asked)
+    for name in drawn:
         choose(cut.status != 0, definition=name)
     places = np.concatenate([plane_vectors(case, "{}"), plane_vectors(case, "outline_{}")])
     width, height = extent(places, (1.0, 1.0))
-    columns = min(NETWORKS_IN_ROW, len(wanted))
+    columns = min(NETWORKS_IN_ROW, len(drawn))
     wide = (style.COLUMN_WIDTH if columns == 1 else style.PAGE_WIDTH) / columns - 0.5
     tall = float(np.clip(wide * height / width, 0.8, 3.2)) + 0.8
-    networks = case.reindex(definition=wanted)
+    networks = case.reindex(definition=drawn)
     scale, forces = magnification(networks), np.abs(networks.spring_force.values)
     # Of 3 % of the springs the force is beyond the ends of the colour scale.
     most = float(np.nanquantile(forces, 0.97)) if np.nanmax(forces, initial=0.0) > 0 else 1.0
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
-    said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
-    lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
-    said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
+    facts = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
+    lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in drawn]
+    facts += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
     there = np.isfinite(case.reference_displacement_x.values).any()
     below = "grey: outline of the reference, displaced; dashed: at rest" if there else "no reference"
-    shown = {name: (networks.sel(definition=name), cut.sel(definition=name)) for name in wanted}
+    shown = {name: (networks.sel(definition=name), cut.sel(definition=name)) for name in drawn}
 
     def draw(panel, part):
         """Draw one network; return notes."""
@@ -360,7 +360,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
             notes.append(status_words(int(state.status)) + message)
         return notes, ""
 
-    flat = style.small_multiples(ax, shown, NETWORKS_IN_ROW, tall, ", ".join(said), draw, said=below)
+    flat = style.small_multiples(ax, shown, NETWORKS_IN_ROW, tall, ", ".join(facts), draw, note=below)
     lines = [one for panel in flat for one in panel.collections]
     if lines and flat[0].figure.get_layout_engine():
         bar = flat[0].figure.colorbar(lines[0], ax=flat.tolist(), location="bottom", extend="both", aspect=50,

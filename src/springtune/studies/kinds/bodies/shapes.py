@@ -34,7 +34,7 @@ from springtune.safe_io import why_unreadable
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import FEWER, check_able, check_density, check_particles
+from ...config.checks import FEWER_REMEDY, check_density, check_fit, check_particles
 from ...config.expand import FROM_THE_STUDY
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional, quantity, read_quantity
 from ...config.messages import refuse, show
@@ -157,7 +157,7 @@ class SupportConfig(Section):
     y: Displacement | None = None
     """Along y; free by default."""
 
-    _fixed = or_text({"fixed": {"x": "0", "y": "0"}}, "no support; give fixed, or displacements such as {y: 0 mm}")
+    _fixed = or_text({"fixed": {"x": "0", "y": "0"}}, "not a support; give fixed, or displacements such as {y: 0 mm}")
 
     @model_validator(mode="after")
     def _something(self) -> Self:
@@ -212,9 +212,9 @@ class QuantityConfig(Section):
     source: fields.Text | None = None
     """Source of the published value."""
 
-    _alone = or_text(
+    _area_or_energy = or_text(
         {name: {name: "true"} for name in ("area", "energy")},
-        "no quantity; give area or energy, or what it is of, such as {displacement: y, at: tip}",
+        "not a quantity; give area or energy, or a quantity and its place, such as {displacement: y, at: tip}",
     )
 
     @model_validator(mode="after")
@@ -228,9 +228,9 @@ class QuantityConfig(Section):
         if wrong := [*set(places) - known.keys(), *places[1:]]:
             raise refuse(f"a {self.kind} has no '{wrong[0]}'{' beside at' * (len(places) > 1)}; {remedy}", wrong[0])
         if known and not places:
-            raise refuse(f"a {self.kind} of nothing; {remedy}", self.kind)
+            raise refuse(f"a {self.kind} without a place; {remedy}", self.kind)
         if self.source and self.expected is None:
-            raise refuse("a source of no value; give 'expected', too, or remove it", "source")
+            raise refuse("is a source without a value; give 'expected', or remove it", "source")
         try:
             self.expected_value  # noqa: B018
         except PydanticCustomError as error:
@@ -500,7 +500,7 @@ LARGEST_FILE_CHECKED = 1_000_000  # size of a mesh file up to which its groups a
 
 
 def check(config, problems):
-    """Add what is wrong, see `springtune.studies.config.model.StudyKind`."""
+    """Check the sections of shapes and add problems, see `springtune.studies.config.model.StudyKind`."""
     stems = {}
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
@@ -555,7 +555,7 @@ def _check_outline(name, shape, path, problems):
 
 
 def _make_shape(name, shape, path, problems):
-    """Shape of a section; None where it is refused."""
+    """Return the shape of a section; None if it is refused."""
     try:
         made = shape_of_config(name, shape, problems.folder)
     except ValueError as error:
@@ -630,7 +630,7 @@ def _check_file(name, shape, file, path, problems, extents):
 
 
 def _check_grid(config, grid, path, problems):
-    check_able(problems, (*path, "definition"), grid.definition, [GENERATED_MESH])
+    check_fit(problems, (*path, "definition"), grid.definition, [GENERATED_MESH])
     for name in grid.definition:
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")
@@ -657,4 +657,4 @@ def _check_grid(config, grid, path, problems):
         check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
     count = len(cases) * len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
     if count > MOST_SHAPE_SCENES:
-        problems.add(path, f"{count} scenes; a study has at most {MOST_SHAPE_SCENES} of shapes: {FEWER}")
+        problems.add(path, f"{count} scenes; a study has at most {MOST_SHAPE_SCENES} of shapes: {FEWER_REMEDY}")

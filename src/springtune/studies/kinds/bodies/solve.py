@@ -39,7 +39,7 @@ def tasks(file, content):
 
 def prepare(file, content):
     """Function that solves a scene of a mesh."""
-    grouped = stored.prepared(content, file)
+    grouped = stored.prepared_mesh(content, file)
     if "shape" in file:
         return partial(solve_shape, file["shape"], grouped, {})
     mesh, labels = grouped.mesh, ("x", "y", "displacements")
@@ -104,10 +104,10 @@ def solve_beam(beam, cache, field, task):
         if group["stiffness"] is None:
             return failed(task, group["message"])
         stiffness = group["stiffness"] * task["thickness_ratio"]
-    wanted = field(task["reference"]) if "reference" in task else None
+    reference_field = field(task["reference"]) if "reference" in task else None
     kind, force, kinematics = LOAD_KINDS[task["kind"]], task["force"], task["kinematics"]
     definition, material = definition_of(task["definition"]), material_of(task["material"])
-    springs, seconds = cache.derive(definition, material, stiffness, (kind, force, wanted))
+    springs, seconds = cache.derive(definition, material, stiffness, (kind, force, reference_field))
     springs = replace(springs, reference=task.get("stiffness_scale", 1) * springs.reference)
     load = Load(kind, copysign(1, force), task["follower"])
     problem = BeamProblem(beam, cache.mesh, material, load, abs(force), kinematics, cache)
@@ -122,15 +122,15 @@ def solve_beam(beam, cache, field, task):
         "solver": found.factor.name if found.factor else "",
         "load_share": found.load_share if kinematics == "nonlinear" else np.nan,
     }
-    if wanted is not None and task.get("keep_fields"):
-        result["reference_displacements"] = force * wanted
+    if reference_field is not None and task.get("keep_fields"):
+        result["reference_displacements"] = force * reference_field
     if not found.converged:
         return result | ({} if found.last is None else {"last_displacement": cache.displacement(kind, found.last)})
     result["displacement"] = solution.displacement
     if kind.pressed:
         result |= _pressed_face(cache, kind, found.displacements)
-    if wanted is not None:
-        result["field_error"] = field_error(cache.mesh, found.displacements, force * wanted)
+    if reference_field is not None:
+        result["field_error"] = field_error(cache.mesh, found.displacements, force * reference_field)
     return result
 
 

@@ -68,7 +68,7 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     return store.read(files(folder, name)[1], [NOTES_KEY])[NOTES_KEY]
 
 
-def prepared(content: dict[str, Any], file: dict[str, Any]) -> GroupedMesh:
+def prepared_mesh(content: dict[str, Any], file: dict[str, Any]) -> GroupedMesh:
     """Mesh of a job's file; raises RefusedError if it cannot be made."""
     folder = Path(content["results"]) / "meshes"
     if found := read(folder, file["name"]):

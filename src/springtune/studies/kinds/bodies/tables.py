@@ -6,10 +6,10 @@ import xarray as xr
 
 from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
-from springtune.problem.quantities import OF_BODIES, SWEPT, shown_order
+from springtune.problem.quantities import BODY_NAMES, SWEPT, shown_order
 from springtune.problem.shapes import beam_label
 
-from ...output.dataset import STATUS, cells, group, in_own_plane, labels_of, like_with_like, records, table_rows
+from ...output.dataset import STATUS, against_own_laws, cells, group, in_own_plane, labels_of, records, table_rows
 from ...output.present import MOST_ROWS, error_decimals, head
 from ...output.text import decimals, number, range_text
 from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
@@ -31,11 +31,11 @@ def tables(tree):
 def own_references(data):
     """Root with errors of nonlinear networks against references at finite strain, where there are any."""
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
-    return like_with_like(group(data, "/"), finite)
+    return against_own_laws(group(data, "/"), finite)
 
 
 def last_swept(present, along=""):
-    """Last swept values of each beam, material and load: what figures without a sweep show."""
+    """Last swept values of each beam, material and load, which figures without a sweep show."""
     names = [str(name) for name in present.dims if name in SWEPT and name != along]
     if not names:
         return {}
@@ -59,13 +59,13 @@ def at(data, values):
     if not chosen:
         return data
     found = data.sel(chosen)
-    for name in {*OF_BODIES.values()} & {*found.variables}:  # of a body, and so the same under all loads but for sweeps
+    for name in {*BODY_NAMES.values()} & {*found.variables}:  # of a body, and so the same under all loads if unswept
         body = name.partition("_")[0]
         found[name] = found[name].isel({one: -1 for one in found[name].dims if one != body}, drop=True)
     return found.reset_coords([name for name in chosen if name in found.coords])
 
 
-def labelled_beam(data, name):
+def beam_title(data, name):
     """Beam name with its dimensions, see `springtune.problem.shapes.beam_label`."""
     if "beam_length" not in data:
         return str(name)
@@ -141,9 +141,9 @@ def _page_cells(rows, definitions, swept, finite):
         line[row["definition"], "[mm]"] = text
         line[row["definition"], "error [%]"] = number(row["error_percent"], percent, sign=True) if answered else ""
         marks |= {*own, *(STATUS_MARKS[status] if answered else ""), *("*" if row["remark"] else "")}
-        said = {f"* {beam}, {size} mm": row["remark"], text: "" if answered else row["message"]}
-        said[f"r {beam}, {row['kinematics']}"] = row["reference_message"] if "r" in own else ""
-        remarks |= {f"{what}: {why}": None for what, why in said.items() if why}
+        reasons = {f"* {beam}, {size} mm": row["remark"], text: "" if answered else row["message"]}
+        reasons[f"r {beam}, {row['kinematics']}"] = row["reference_message"] if "r" in own else ""
+        remarks |= {f"{what}: {why}": None for what, why in reasons.items() if why}
     medians = data["error_percent"].abs().groupby(data["definition"]).median()
     best = sorted(definitions, key=lambda name: (np.isnan(medians[name]), medians[name]))
     columns = [(name, unit) for name in best for unit in ("[mm]", "error [%]")]
@@ -155,7 +155,7 @@ def _page_cells(rows, definitions, swept, finite):
 
 
 def _stiffnesses(rows):
-    """Text on what to type: the stiffness of uniform definitions, and medians inside and on the outline of others."""
+    """Text with the stiffness to type: of uniform definitions one, of others medians inside and on the outline."""
     parts = []
     for name, own in pd.DataFrame(rows).groupby("definition", sort=False):
         words = {"stiffness_inside_N_per_m": " inside", "stiffness_outline_N_per_m": " on the outline"}

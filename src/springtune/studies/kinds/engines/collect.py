@@ -26,10 +26,10 @@ ENGINE_CURVES = Group("/engine_curves", CURVES["variables"] | BEST["variables"],
 def groups(study, folder):
     """Build the groups of a dataset."""
     made, found = {}, [*zip(study.parts["engines"], stored_rows(STAGE, study, folder), strict=True)]
-    for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
-        rows = [row for run, row in found if run.of_curve == wanted]
+    for group, of_curve in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
+        rows = [row for run, row in found if run.of_curve == of_curve]
         axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}
-        curves = group_by(rows if wanted else (), itemgetter(*RUN))
+        curves = group_by(rows if of_curve else (), itemgetter(*RUN))
         rows += [dict(zip(RUN, setting)) | _best_factor(runs) for setting, runs in curves.items()]
         if rows:
             shared = {name: study.axes[name] for name in study.axes.keys() - CURVES["dimensions"].keys()}

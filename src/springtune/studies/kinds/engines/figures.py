@@ -30,8 +30,8 @@ def _runs(data, name, scene):
     if runs.definition.nunique() > 1:
         runs["engine"] += ", " + runs.definition
     lost = runs[runs.error.isna()].replace({"end": {"rest": "without a reference"}}).groupby("end", sort=False).engine
-    said = ", ".join(f"{len(names)} {end} ({'; '.join(names.unique())})" for end, names in lost)
-    return case, dict(list(runs.groupby("engine", sort=False))), said
+    missing = ", ".join(f"{len(names)} {end} ({'; '.join(names.unique())})" for end, names in lost)
+    return case, dict(list(runs.groupby("engine", sort=False))), missing
 
 
 @style.styled
@@ -76,20 +76,20 @@ def plot_engine_errors(data, ax=None, *, scene=None):
         panel.plot(times[best], errors[best], label=name, **look)
         there |= bool(len(best))
     panel.set(xlabel="Time for 1/60 s of motion [ms]", ylabel="|Error| [%]", title=case.scene.item())
-    said = [f"not drawn: {lost}"] if lost else []
+    notes = [f"not drawn: {lost}"] if lost else []
     if there:
         errors = 100 * np.abs(case.definition_error.sel(definition=labels_of(case.status != 0, "definition")))
         known = {name: error for name, error in errors.to_series().items() if error > 0}  # NaN is not
         for error in known.values():
             panel.axhline(error, color="0.45", linewidth=0.8, zorder=0, linestyle=(0, (1, 1.5)))
         texts = ", ".join(f"{name} {error:.2g} %" for name, error in known.items())
-        said.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
+        notes.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
         style.logarithmic(panel)
         low, high = panel.get_xlim()
         if low < 1e3 * FRAME_SECONDS < high:
             panel.axvline(1e3 * FRAME_SECONDS, color="0.7", linewidth=0.9, zorder=0)
-            said.insert(1, "right of the grey line: slower than real time")
-    style.add_legend(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
+            notes.insert(1, "right of the grey line: slower than real time")
+    style.add_legend(panel, ["; ".join(notes)], f"No run is at rest beside a reference: {lost}.")
     return panel
 
 

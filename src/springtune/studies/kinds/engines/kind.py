@@ -133,7 +133,7 @@ def _check(config, problems):
             checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:
                 scene = section.scenes[one]
-                checks.check_able(problems, (*place, "definition"), runs.definition, [scene.mesh_type], [scene.load])
+                checks.check_fit(problems, (*place, "definition"), runs.definition, [scene.mesh_type], [scene.load])
         checks.check_product(problems, runs, place, RUN_KEYS, MOST_ENGINE_RUNS)
     lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in RUN_KEYS}
     lists["scene"] = {*section.scenes}
@@ -172,13 +172,13 @@ def _tasks(study):
     for run in study.parts["engines"]:
         engine = _engines()[run.labels["engine"]]
         values = {name: value for name, value in run.values.items() if name != "scene"}
-        also = mesh_type_key(values["mesh_type"]), definition_key(values["definition"]), declared_key(engine)
+        code = mesh_type_key(values["mesh_type"]), definition_key(values["definition"]), declared_key(engine)
         needs = (distribution(need.partition(">=")[0]) for need in engine.needs)
         values["engine_version"] = ", ".join(f"{name} {version_of(name)}" for name in needs)  # a new one runs again
-        yield Task(values, also, run.labels, name=engine.name)
+        yield Task(values, code, run.labels, name=engine.name)
 
 
-STAGE = Stage("engines", "studies.kinds.engines.solve", _tasks, alone=True)
+STAGE = Stage("engines", "studies.kinds.engines.solve", _tasks, timed=True)
 
 
 def _figures(study):

@@ -93,15 +93,15 @@ def _draw_shape(panel, laid):
     """Draw trapezoid, reference and the finest solved network; return a note that names them."""
     panel.fill(*_outline_points(laid, "trapezoid").T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
     panel.axhline(0, color="0.45", linewidth=0.8)
-    reference, said = _outline_points(laid, "reference"), "no reference"
+    reference, note = _outline_points(laid, "reference"), "no reference"
     if len(reference):
         panel.fill(*reference.T, facecolor="0.72", edgecolor="none")
-        said = "grey: finite elements"
+        note = "grey: finite elements"
     for cell in cells(laid.status == 1, ("definition", "mesh_size"))[:1]:
         points = _outline_points(laid.sel(cell), "strip")
         panel.plot(*np.vstack([points, points[:1]]).T, color=style.line(1)["color"], linewidth=0.9)
-        return f"{said}; line: {cell['definition']}, {1e3 * cell['mesh_size']:g} mm"
-    return f"{said}; no network was solved"
+        return f"{note}; line: {cell['definition']}, {1e3 * cell['mesh_size']:g} mm"
+    return f"{note}; no network was solved"
 
 
 def _draw_dots(panel, laid, names, variable):
@@ -114,8 +114,8 @@ def _draw_dots(panel, laid, names, variable):
         panel.plot(values[solved[1:]], np.full(len(solved[1:]), number), markerfacecolor="white", **mark)
         panel.plot(values[solved[:1]], np.full(len(solved[:1]), number), markersize=4.5, label=definition, **mark)
         if not len(solved):
-            said = ", ".join(count_statuses(strips.status.values)) or "not requested"
-            panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
+            reason = ", ".join(count_statuses(strips.status.values)) or "not requested"
+            panel.text(0.5, number, reason, transform=panel.get_yaxis_transform(), ha="center", va="center",
                        fontsize=style.SMALL_TEXT, color="0.25")  # fmt: skip
     panel.set_yticks(range(len(names)), map(no_mathematics, names))
     panel.set_ylim(len(names) - 0.4, -0.6)

@@ -8,7 +8,7 @@ from pydantic import Field
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import check_able, check_beam_material, check_particles, check_product
+from ...config.checks import check_beam_material, check_fit, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.model import Output, Stage, StudyKind, declared
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -83,7 +83,7 @@ class LayingConfig(Section):
 def _check(config, problems):
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
-    check_able(problems, ("laying", "definition"), config.laying.definition, ["structured"])
+    check_fit(problems, ("laying", "definition"), config.laying.definition, ["structured"])
     check_product(problems, config.laying, ("laying",), STRIP, MOST_STRIPS)
     beam = config.beams[config.laying.strip]
     for key, sizes in (("mesh_size", config.laying.mesh_size), ("reference_size", [config.laying.reference_size])):
@@ -115,8 +115,8 @@ def _expand(config, declared):
 def _tasks(study):
     for labels, values in study.parts["laying"]:
         # The trapezoid is of Delingette's springs.
-        also = mesh_type_key("structured"), definition_key(values["definition"]), definition_key("delingette")
-        yield Task(values, also, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
+        code = mesh_type_key("structured"), definition_key(values["definition"]), definition_key("delingette")
+        yield Task(values, code, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
 
 
 PLOTS = "studies.kinds.laying.figures"

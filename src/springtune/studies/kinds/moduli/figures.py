@@ -6,7 +6,7 @@ import pandas as pd
 from ...output import style
 from ...output.answers import count_statuses
 from ...output.dataset import choose, group, labels_of, sign_of_errors
-from ..bodies.tables import at, labelled_beam, last_swept
+from ..bodies.tables import at, beam_title, last_swept
 
 
 def definitions(tree):
@@ -78,7 +78,7 @@ def _group_equal_curves(curves, within):
 def _moduli(panel, here):
     """Draw the moduli of one mesh type; return notes, and a message if there are none."""
     panel.set(xlabel="requested", ylabel="effective")
-    curves, lacking, wanted = {}, [], here.poisson_ratio.values
+    curves, lacking, requested = {}, [], here.poisson_ratio.values
     for definition in here.definition.values:
         one = here.sel(definition=definition)
         sizes = np.flatnonzero((one.status == 1).any("poisson_ratio").values)
@@ -86,17 +86,17 @@ def _moduli(panel, here):
             curves[str(definition)] = one.effective_poisson_ratio.values[sizes[0]]
         elif (one.status != 0).any():
             lacking.append(str(definition))
-    low, high = wanted.min(), max(wanted.max(), wanted.min() + 1e-3)
+    low, high = requested.min(), max(requested.max(), requested.min() + 1e-3)
     panel.plot([low, high], [low, high], color="0.8", linewidth=3.5, zorder=0)
     panel.set_xlim(low - 0.02, high + 0.02)
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
     for number, names in enumerate(_group_equal_curves(curves, 0.012)):
-        panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
-    said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
+        panel.plot(requested, curves[names[0]], label=", ".join(names), **style.line(number))
+    notes = [f"no moduli: {', '.join(lacking)}"] if lacking else []
     counts = ", ".join(f"{name} ({count})" for name, count in count_statuses(here.status.values).items())
-    return said, f"No definition has moduli here: {counts or 'none was requested'}."
+    return notes, f"No definition has moduli here: {counts or 'none was requested'}."
 
 
 @style.styled
@@ -158,13 +158,13 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         ratio = f"ν = {float(root.material_poisson_ratio.sel(material=material)):g}"
         shown[ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}"] = material
     flags = root.status.sel(material=materials).values
-    said = [sign_of_errors(root), f"{style.NO_RESULT}: no result" * bool((flags > 1).any())]
-    said += [f"{style.NOT_ASKED}: not requested" * bool((flags == 0).any())]
-    said += [f"*: {style.BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
-    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
+    note = [sign_of_errors(root), f"{style.NO_RESULT}: no result" * bool((flags > 1).any())]
+    note += [f"{style.NOT_REQUESTED}: not requested" * bool((flags == 0).any())]
+    note += [f"*: {style.BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
+    title = f"{beam_title(root, chosen['beam'])}, {chosen['mesh_type']}"
     title += ": deformation error [%] on the finest mesh solved"
-    said, height = "; ".join(filter(None, said)), 1.2 + 0.165 * len(names)
-    return style.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
+    note, height = "; ".join(filter(None, note)), 1.2 + 0.165 * len(names)
+    return style.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, note=note)
 
 
 def _default_materials(root, solved):

@@ -62,10 +62,10 @@ def _tasks(study):
     for labels in cells:
         definition, mesh_type, size, ratio = labels.values()
         mesh, name = _patch_mesh(study, box, mesh_type, size), f"{mesh_type}_{1e3 * size:g}mm"
-        also = parameters(mesh_source(mesh)), mesh_type_key(mesh_type), definition_key(definition)
+        code = parameters(mesh_source(mesh)), mesh_type_key(mesh_type), definition_key(definition)
         values = {"definition": definition, "poisson_ratio": ratio}
         seconds = expected_seconds(particles(mesh.beam.length * mesh.beam.height, size), definition)
-        yield Task(values, also, labels, seconds, name, file=name, shared={"mesh": mesh_source(mesh)})
+        yield Task(values, code, labels, seconds, name, file=name, shared={"mesh": mesh_source(mesh)})
 
 
 def _patch_mesh(study, box, mesh_type, size):

@@ -32,7 +32,7 @@ MOST_SOBOL_POINTS = 512  # most points of a task of plain Sobol points
 
 
 def blocks(design: str, size: int) -> list[tuple[int, int]]:
-    """First base sample of each task, and the one after its last. Those of a size begin with those of half the size.
+    """First base sample of each task, and the one after its last. The tasks of half the size come first.
 
     >>> blocks("sobol-indices", 16), blocks("sobol-indices", 32)
     ([(0, 8), (8, 16)], [(0, 8), (8, 16), (16, 32)])

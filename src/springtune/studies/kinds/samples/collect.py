@@ -19,8 +19,8 @@ from ...runs import store
 from ..bodies import any_reference
 from . import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
-from .kind import MOST_SOLVED_ROWS, UNIFORM, block_key, reference_key, result_key
-from .solve import DRAWN
+from .kind import MOST_SOLVED_ROWS, UNIFORM_DEFINITION, block_key, reference_key, result_key
+from .solve import DRAWN_KEY
 
 SAMPLES = Group("/samples", **declared(__file__, "/samples"), flags={"reference_applies": ("no", "yes")})
 SOBOL = Group("/sobol", **declared(__file__, "/sobol"))
@@ -37,7 +37,7 @@ def groups(study, folder):
     drawn, results = _read_results(sample, folder / "samples")
     axes = study.axes | {"sample": tuple(range(sample.rows)), "parameter": sample.varied, "quantity": QUANTITIES}
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
-    particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
+    particles = np.max([results[key]["particles"] for key in results if key != DRAWN_KEY], axis=0)
     group, places = _coordinates(sample, drawn, study.axes)
     frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
     frames += chain.from_iterable(_load_rows(load, sample, drawn, results, folder / "samples") for load in sample.load)
@@ -55,9 +55,9 @@ def _read_results(sample, folder):
     keys = sorted({result_key(sample, load, name) for load in sample.load for name in sample.solved})
     names = [*dict.fromkeys([*sample.drawn, "mesh_size"])]
     paths = [folder / f"{block_key(sample, *ends)}.h5" for ends in blocks(sample.design, sample.size)]
-    read = [store.read(path, [DRAWN, *keys], [*names, "displacement", "status", "particles"]) for path in paths]
-    found = {key: pd.concat([_frame(one[key]) for one in read], ignore_index=True) for key in (DRAWN, *keys)}
-    return {name: found[DRAWN][name].values for name in names}, found
+    read = [store.read(path, [DRAWN_KEY, *keys], [*names, "displacement", "status", "particles"]) for path in paths]
+    found = {key: pd.concat([_frame(one[key]) for one in read], ignore_index=True) for key in (DRAWN_KEY, *keys)}
+    return {name: found[DRAWN_KEY][name].values for name in names}, found
 
 
 def _frame(found):
@@ -73,7 +73,7 @@ def _load_rows(load, sample, drawn, results, folder):
     answers, why = _unit_references(sample, drawn, folder, kind, drawn["length"] / drawn["height"])
     _, scale = unit_scales(body, body, kind)
     reference = sign * drawn["force"] * scale * answers.displacement
-    uniform = results[result_key(sample, load, UNIFORM)]
+    uniform = results[result_key(sample, load, UNIFORM_DEFINITION)]
     solved = np.where(uniform["status"] == Status.SOLVED, sign * uniform["displacement"], np.nan)
     values = {
         "reference_displacement": reference,
@@ -89,7 +89,7 @@ def _load_rows(load, sample, drawn, results, folder):
         there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
         displacement = np.where(there, sign * found["displacement"], np.nan)
         values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
-        values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
+        values |= {"status": found["status"], "stiffness": softness if name == UNIFORM_DEFINITION else np.nan}
         yield pd.DataFrame(rows | {"definition": name, "message": found["message"]} | values)
 
 

@@ -41,16 +41,16 @@ def plot_sobol(data, ax=None, *, load=None):
     >>> [tick.get_text() for tick in axes[0].get_yticklabels()]
     ['height', 'force']
     """
-    found, samples = group(data, "sobol", alone=False), group(data, "samples", alone=False)
+    found, samples = group(data, "sobol", needs_tree=True), group(data, "samples", needs_tree=True)
     asked = found.base_samples + found.base_samples_without > 0
     load = choose(asked.any("quantity"), load=load)["load"]
     found, asked = found.sel(load=load), asked.sel(load=load)
     names, order, shown = found.parameter.values.tolist(), found["definition"].values.tolist(), {}
     for quantity in sorted(found["quantity"].values.tolist(), key=lambda name: name != "deformation_error"):
         for definition in labels_of(asked.sel(quantity=[quantity]), "definition"):
-            alone = quantity == "best_stiffness"  # of uniform springs alone
-            title = quantity.replace("_", " ") + ("" if alone else f", {definition}")
-            look = "0.35" if alone else style.line(order.index(definition))["color"]
+            uniform = quantity == "best_stiffness"  # of uniform springs alone
+            title = quantity.replace("_", " ") + ("" if uniform else f", {definition}")
+            look = "0.35" if uniform else style.line(order.index(definition))["color"]
             shown.setdefault(title, (found.sel(quantity=quantity, definition=definition), look))
     bands = found[[name for name in found if name.endswith(("_low", "_high"))]].to_array()
     low, high = max(min(0.0, bands.min()), INDEX_LIMITS[0]), min(max(1.0, bands.max()), INDEX_LIMITS[1])
@@ -79,7 +79,7 @@ def plot_sobol(data, ax=None, *, load=None):
     columns = max(1, min(4, len(order)))
     title = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
     title, height = f"{title}: Sobol indices", 0.21 * len(names) + 0.8
-    return style.small_multiples(ax, shown, columns, height, title, draw, sharey=True, said=note)
+    return style.small_multiples(ax, shown, columns, height, title, draw, sharey=True, note=note)
 
 
 def sobol(tree):

@@ -12,7 +12,7 @@ from springtune.safe_io import number_text
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
+from ...config.checks import MORE_SCENES_REMEDY, check_fit, check_particles, in_mm, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
 from ...config.messages import refuse, show, words
 from ...config.model import Output, Stage, StudyKind, stem
@@ -43,17 +43,17 @@ def parameter(name: str, example: str) -> Any:
     keys: dict[str, Any] = {key: (kind, Field(alias=alias)) for key, alias in (("low", "from"), ("high", "to"))}
     keys |= {key: (kind | None, None) for key in ("mode", "mean", "deviation")}
     section = create_model(f"{name}_distribution", __base__=DistributionConfig, **keys)
-    alone = TypeAdapter(kind, config=ConfigDict(defer_build=True))
+    single = TypeAdapter(kind, config=ConfigDict(defer_build=True))
 
     def read(value: object) -> dict[str, Any]:
         if isinstance(value, dict | list):
             return _distribution(name, section.model_validate(value))
-        number = alone.validate_python(value)
+        number = single.validate_python(value)
         return {"distribution": "fixed", "low": number, "high": number}
 
     def or_section(schema: dict[str, Any]) -> None:
         schema.pop("additionalProperties"), schema.pop("type")
-        schema["anyOf"] = [alone.json_schema(), section.model_json_schema()]
+        schema["anyOf"] = [single.json_schema(), section.model_json_schema()]
 
     title = f"{words(kind)}, or a range such as `{example}`"
     return BeforeValidator(read), Field(title=title, json_schema_extra=or_section)
@@ -85,7 +85,7 @@ def _distribution(name: str, section: DistributionConfig) -> dict[str, Any]:
 
 MOST_SOLVED_ROWS = 1024  # most rows of a sample whose references are solved one by one if they cannot be interpolated
 
-UNIFORM = "uniform"  # definition of the best uniform stiffness
+UNIFORM_DEFINITION = "uniform"  # definition of the best uniform stiffness
 
 SOLVE, INTERPOLATE = "studies.kinds.samples.solve", "studies.kinds.samples.interpolate"
 
@@ -173,7 +173,7 @@ class SamplesConfig(Section):
     @property
     def solved(self) -> list[str]:
         """Definitions whose networks are solved; uniform springs give the best stiffness."""
-        return list(dict.fromkeys([*self.definition, UNIFORM]))
+        return list(dict.fromkeys([*self.definition, UNIFORM_DEFINITION]))
 
     @property
     def drawn(self) -> dict[str, Drawn]:
@@ -217,12 +217,12 @@ def _check(config, problems):
         _check_sizes(sample, problems)
     if not sample.varied:
         problems.add(where, "nothing varies; give at least one parameter a range such as {from: 100 mm, to: 400 mm}")
-    check_able(problems, ("samples", "definition"), sample.definition, [sample.mesh_type], sample.load)
+    check_fit(problems, ("samples", "definition"), sample.definition, [sample.mesh_type], sample.load)
     most = most_scenes(problems)
     if sample.scenes > most:
         each = f"{sample.each} rows x {len(sample.load)} loads x {len(sample.definition)} definitions"
         what = f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {most}"
-        problems.add(("samples", "size"), f"{what}: give a smaller size, or fewer loads and definitions, {MORE_SCENES}")
+        problems.add(("samples", "size"), f"{what}: give fewer points, loads or definitions, {MORE_SCENES_REMEDY}")
 
 
 def _check_sizes(sample, problems):

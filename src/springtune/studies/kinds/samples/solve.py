@@ -19,7 +19,7 @@ from springtune.springs.base import DefinitionError
 from ...runs import store
 from . import draw
 
-DRAWN = "drawn"  # key of the drawn parameters among the results of a task
+DRAWN_KEY = "drawn"  # key of the drawn parameters among the results of a task
 
 TASKS_TOGETHER = 32  # tasks whose meshes are sorted together, so that more of them share a pattern
 
@@ -32,7 +32,7 @@ def run(content, attempts):
     for file in content["files"]:
         path = Path(content["folder"]) / f"{file['name']}.h5"
         present = store.stored_keys(path)
-        if not {DRAWN, *file["results"]} <= present:
+        if not {DRAWN_KEY, *file["results"]} <= present:
             waiting.append(_Block(file, path, present))
     for begin in range(0, len(waiting), TASKS_TOGETHER):
         _solve_together(waiting[begin : begin + TASKS_TOGETHER], attempts)
@@ -45,7 +45,7 @@ class _Block:
         (task,) = file["tasks"]
         self.file, self.path = file, path
         self.missing = {key: scene for key, scene in file["results"].items() if key not in present}
-        self.is_new = DRAWN not in present
+        self.is_new = DRAWN_KEY not in present
         self.drawn = draw(file["design"], file["seed"], file["parameters"], task["first"], task["last"])
         rows = len(self.drawn["length"])
         self.found = {
@@ -83,7 +83,7 @@ def _solve_together(blocks, attempts):
     for box, block, rows in meshes:
         like = _solve_mesh(block, box, np.array(rows), like, scaling, attempts) or like
     for block in () if attempts.broken else blocks:
-        store.add(block.path, block.found | ({DRAWN: block.drawn} if block.is_new else {}))
+        store.add(block.path, block.found | ({DRAWN_KEY: block.drawn} if block.is_new else {}))
         attempts.computed += 1
 
 

@@ -86,9 +86,9 @@ def plot_stability_maps(data, ax=None):
 
     shown = {SCHEMES.get(name, name.replace("-", " ").capitalize().replace("euler", "Euler")): name
              for name in data.integrator.values}  # fmt: skip
-    said = "Damping ratio of the highest mode, mass-proportional damping; line: predicted limit"
+    note = "Damping ratio of the highest mode, mass-proportional damping; line: predicted limit"
     title, key = "Behaviour of noise by time step and damping", _swatches(BEHAVIOUR_COLOURS)
-    return style.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, said=said, key=key)
+    return style.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, note=note, key=key)
 
 
 @style.styled
@@ -145,10 +145,10 @@ def plot_stability_strains(data, ax=None):
 
     seen = np.unique(data.strain_status.sel(definition=names)).astype(int)
     key = _swatches({STATUS[flag].replace("_", " "): STATUS_COLOURS[flag] for flag in seen})
-    said = "number: negative pivots; %: share of the load that is reached; f: flutter; path: unstable on the way"
+    note = "number: negative pivots; %: share of the load that is reached; f: flutter; path: unstable on the way"
     shown = {STRAIN_LOADS.get(load, load): load for load in data.strain_load.values}
     height = 0.6 + 0.19 * max(len(names), 2)
-    return style.small_multiples(ax, shown, 1, height, "Equilibria at large strain", draw, said=said, key=key)
+    return style.small_multiples(ax, shown, 1, height, "Equilibria at large strain", draw, note=note, key=key)
 
 
 # -- tables ------------------------------------------------------------------------------------------------------------

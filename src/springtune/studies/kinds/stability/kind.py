@@ -8,7 +8,7 @@ from springtune.mechanics import BEHAVIOURS
 from springtune.mesh.cells import MESH_TYPES
 
 from ...config import fields
-from ...config.checks import check_able, check_beam_material, check_density, check_particles
+from ...config.checks import check_beam_material, check_density, check_fit, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.model import Output, Stage, StudyKind, declared
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -54,7 +54,7 @@ def _check(config, problems):
     section = config.stability
     check_beam_material(problems, ("stability", "material"), section.material, config)
     check_density(config, section.material, ("stability", "material"), problems)
-    check_able(problems, ("stability", "definition"), section.definition, ["structured"])
+    check_fit(problems, ("stability", "definition"), section.definition, ["structured"])
     extent = config.beams[section.beam].length, config.beams[section.beam].height
     check_particles(problems, ("stability", "mesh_size"), section.mesh_size, *extent)
     if (largest := max(section.mesh_size)) > 0.3 * min(extent):
@@ -85,8 +85,8 @@ def _axes(experiments):
 
 def _tasks(study):
     for (name, definition), values in study.parts["stability"].items():
-        also = mesh_type_key(values["mesh_type"]), definition_key(definition)
-        yield Task(values, also, {"experiment": name, "definition": definition}, seconds=3.0)
+        code = mesh_type_key(values["mesh_type"]), definition_key(definition)
+        yield Task(values, code, {"experiment": name, "definition": definition}, seconds=3.0)
 
 
 def _shown(study, names):

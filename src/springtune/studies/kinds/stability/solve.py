@@ -287,7 +287,7 @@ The condition number of a network is about its number of particles times the con
 
 
 def contrast(setup):
-    """Error of the linear solution with alternating stiff and soft parts, against extended precision."""
+    """Error of the linear solution by ratio of stiff to soft parts, against extended precision."""
     whole, reference = setup.problem(setup.coarse)
     network, s = whole.network, setup.force / reference
     middle = setup.coarse.points[setup.coarse.edges].mean(axis=1)[:, 0]

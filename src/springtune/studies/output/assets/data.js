@@ -99,7 +99,7 @@ class Group {
     return this;
   }
 
-  // Numbers of cells by status, but for those that were not asked for.
+  // Numbers of cells by status, but for those that were not requested.
   tally() {
     const found = {};
     if (this.status) for (const word of Object.values(this.status.flags)) found[word] = 0;
