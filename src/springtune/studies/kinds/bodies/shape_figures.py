@@ -232,7 +232,7 @@ def _errors_by_quantity(whole, material, kinematics):
 
 
 def extent(places, nothing):
-    """Width and height of the box around points (n, 2), NaN left out; `nothing` if no point is left."""
+    """Width and height of the box around points (n, 2), NaN left out; `nothing` if the box has no area."""
     known = places[np.isfinite(places).all(axis=1)]
     wide, high = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
     return (float(wide), float(high)) if min(wide, high) > 0 else nothing
