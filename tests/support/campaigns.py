@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
+import h5netcdf
 import pytest
-import xarray as xr
 
 import springtune as st
 from springtune.studies.kinds import collect
@@ -41,15 +41,14 @@ def do_stages(study, folder, *stages):
 
 def held(path):
     """What a dataset holds, without times: attributes, and values and dimensions of variables, by group."""
-    with xr.open_datatree(path, engine="h5netcdf", decode_cf=False) as tree:
-        nodes = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
     found = {}
-    for place, data in nodes.items():
-        found[place] = {name: str(one) for name, one in data.attrs.items() if not TIMES.search(name)}
-        for name, array in data.variables.items():
-            if not TIMES.search(name):
-                values = array.values.tolist() if array.dtype.kind in "OU" else array.values.tobytes()
-                found[place][name] = (array.dims, values)
+    with h5netcdf.File(path) as file:
+        for group in (file, *file.groups.values()):
+            held = found[group.name] = {name: str(one) for name, one in group.attrs.items() if not TIMES.search(name)}
+            for name, stored in group.variables.items():
+                if not TIMES.search(name):
+                    values = stored[...]
+                    held[name] = stored.dimensions, values.tolist() if values.dtype == object else values.tobytes()
     return found
 
 

@@ -24,7 +24,7 @@ def tree(run):
     run.write("beyond.yaml", STUDY)
     with contextlib.chdir(run.folder):
         Campaign("beyond.yaml").finish()
-    with xr.open_datatree(run.folder / "results/beyond/dataset.nc", engine="h5netcdf") as opened:
+    with st.open(run.folder / "results/beyond") as opened:
         yield opened.load()
 
 

@@ -7,7 +7,6 @@ import contextlib
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import springtune as st
 
@@ -22,7 +21,7 @@ def study(sizes="10 mm, 5 mm", load="traction", force="20 kN"):
 
 
 def dataset(run, name):
-    with xr.open_datatree(run.folder / f"results/{name}/dataset.nc", engine="h5netcdf") as tree:
+    with st.open(run.folder / f"results/{name}") as tree:
         return tree.load()
 
 

@@ -58,7 +58,8 @@ def run(*replaced, name="sample", outputs="tables"):
             campaign.do(job)
     for path in campaign.jobs["interpolate_0"].products:
         shutil.copy(path, "references")
-    return xr.load_datatree(campaign.folder / "dataset.nc", engine="h5netcdf"), campaign
+    with st.open(campaign.folder) as tree:
+        return tree.load(), campaign
 
 
 def solved():

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 import yaml
 from click.testing import CliRunner
 
@@ -29,7 +28,7 @@ def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     do_stages(study, folder)
     collect.run(study, folder, folder / "dataset.nc")
-    with xr.open_datatree(folder / "dataset.nc", engine="h5netcdf") as tree:
+    with st.open(folder) as tree:
         tree.load()
     return tree, (folder / "summary.txt").read_text()
 
