@@ -1,6 +1,6 @@
 """Networks in motion: closed forms, limits of the step, orders of convergence, invariants."""
 
-from functools import cache
+from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -346,10 +346,8 @@ def test_a_standing_wave_on_a_chain_has_its_closed_form(linear, precision, error
     assert np.abs(found.displacements - swing * shape).max() <= error * 1e-7
 
 
-@cache
-def threaded():
-    """A beam whose springs are enough for three threads."""
-    return beam(mesh_type="free", size=6e-4)
+threaded = cache(partial(beam, mesh_type="free", size=6e-4))
+"""A beam whose springs are enough for three threads."""
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
