@@ -116,3 +116,11 @@ def draw(
     if "mesh_size" not in found:
         found["mesh_size"] = found["relative_mesh_size"] * found["height"]
     return found
+
+
+def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
+    """Key of a reference that is solved alone, in the file of the interpolant that could not be built.
+
+    Not in `interpolate`: a dataset would depend on all code that solves references.
+    """
+    return f"{interpolant} {float(aspect_ratio)!r} {float(nu)!r}"

@@ -17,8 +17,7 @@ from ...config.model import declared
 from ...output.dataset import Group
 from ...runs import store
 from ..bodies import any_reference
-from . import PARAMETERS, SOBOL_INDICES, blocks, roles
-from .interpolate import problem_key
+from . import PARAMETERS, SOBOL_INDICES, blocks, problem_key, roles
 from .kind import MOST_SOLVED_ROWS, UNIFORM_DEFINITION, block_key, reference_key, result_key
 from .solve import DRAWN_KEY
 

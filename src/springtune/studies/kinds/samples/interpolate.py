@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..bodies.reference import make_interpolant
-from . import draw
+from . import draw, problem_key
 
 
 def run(content, attempts):
@@ -15,8 +15,3 @@ def run(content, attempts):
             pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
         make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, attempts)
-
-
-def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
-    """Key of a reference that is solved alone, in the file of the interpolant that could not be built."""
-    return f"{interpolant} {float(aspect_ratio)!r} {float(nu)!r}"
