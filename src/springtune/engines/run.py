@@ -339,8 +339,7 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
     """Advance a session until it rests: the way left, extrapolated from the last changes, is below `tolerance`."""
-    seen: list[np.ndarray] = []
-    seconds: list[float] = []  # a frame, without the first one, which may compile
+    seen, seconds = list[np.ndarray](), list[float]()  # of frames; seconds without the first one, which may compile
 
     def ended(displacements: np.ndarray, status: str, message: str, swing: float) -> Ended:
         return Ended(displacements, status, message, done, float(np.median(seconds)) if seconds else np.nan, swing)

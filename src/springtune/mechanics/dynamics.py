@@ -131,8 +131,7 @@ class Motion(Moving):
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
             raise ValueError("no load, so no mode is loaded; ask the motion under the load, without released=True")
-        found: list[np.ndarray] = []
-        solved: list[np.ndarray] = []
+        found, solved = list[np.ndarray](), list[np.ndarray]()
         vector = answer = factor.solve(load)
         while True:
             for _ in range(2):

@@ -373,8 +373,7 @@ class Network:
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
         takes_over = otherwise if next_one else None
-        assemble = partial(self.blocks, displacements)
-        return Multigrid(assemble, self.mesh.points, self.held, takes_over, like, besides)
+        return Multigrid(partial(self.blocks, displacements), self.mesh.points, self.held, takes_over, like, besides)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

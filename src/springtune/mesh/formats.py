@@ -70,8 +70,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     if len(mesh.bonds):
         raise MeshError(f"{path}: a mesh file has no place for {len(mesh.bonds)} bonds; write the springs of a scene")
     # A named point that is no particle becomes a point of its own.
-    places: list[np.ndarray] = []
-    blocks: list[tuple[str, np.ndarray, str]] = []
+    places, blocks = list[np.ndarray](), list[tuple[str, np.ndarray, str]]()
     for count, labels in part_names(grouped).items():
         for part in ("", *grouped.parts):
             if (mask := labels == part).any():

@@ -110,9 +110,7 @@ def solve_shape(
     """
     problem = Problem(shape, load, materials if isinstance(materials, Mapping) else {"": materials}, grouped)
     names = [quantity.name for quantity in load.quantities]
-    values: list[dict[str, float]] = []
-    estimates: dict[str, float] = {}
-    bounds: dict[str, float] = {}
+    values, estimates, bounds = list[dict[str, float]](), dict[str, float](), dict[str, float]()
     complaint = ""
     for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
         if complaint and problem.size(degree) > MOST_LEVEL_ENTRIES:
@@ -162,8 +160,7 @@ def solve_each(
     except (ReferenceNotConvergedError, ValueError) as error:
         if len(load.quantities) < 2:
             return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
-    found: list[ShapeReference] = []
-    lacking: dict[str, str] = {}
+    found, lacking = list[ShapeReference](), dict[str, str]()
     for one in load.quantities:
         more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped, solve)
         found += more

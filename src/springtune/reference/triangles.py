@@ -169,8 +169,7 @@ class CoarseMesh:
         """Cut the triangles at corners, of which no triangle has two, once."""
         for corner in sorted(corners):
             rows = np.flatnonzero((self.triangles == corner).any(axis=1))
-            cuts: dict[int, int] = {}
-            wheres: list[np.ndarray] = []
+            cuts, wheres = dict[int, int](), list[np.ndarray]()
             triangles = []
             for row in rows:
                 v, a, b = (int(point) for point in self.triangles[row])
@@ -259,8 +258,7 @@ def outline_mesh(
         names, whole = _polygons(grouped)
     corners = np.array([end for piece in whole for end in (piece.side.start, piece.side.end)])
     extent = float(np.ptp(corners, axis=0).max())
-    pieces: list[_Piece] = []
-    placed: set[str] = set()
+    pieces, placed = list[_Piece](), set[str]()
     for piece in whole:
         on_it = piece.side.find_points(points, LENGTH_TOLERANCE * extent)
         placed.update(on_it)
@@ -317,8 +315,7 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     for name, edges in grouped.sides.items():
         for first, second in np.sort(edges, axis=1).tolist():
             groups[first, second] = (*groups.get((first, second), ()), name)
-    leaving: dict[int, list[_Ends]] = {}
-    arriving: dict[int, list[_Ends]] = {}
+    leaving, arriving = dict[int, list[_Ends]](), dict[int, list[_Ends]]()
     keys: dict[_Ends, tuple[int, int, tuple[str, ...]]] = {}  # what is beside a way
     for (first, second), part in part_of.items():
         other = part_of.get((second, first), -1)

@@ -136,8 +136,7 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
 
     grids = []
     for name, grid in config.grids.items():
-        scenes: list[SceneSpec] = []
-        curves: dict[CurveSpec, None] = {}
+        scenes, curves = list[SceneSpec](), dict[CurveSpec, None]()
         absent = set()
         signs = {load: (LOADS[load].sign, LOADS[load].follower) for load in grid.load}
         for one in combinations(grid):

@@ -268,8 +268,7 @@ class _Reader:
             return self.text(node, path)
         if isinstance(node, yaml.SequenceNode):
             return [self.content(item, (*path, number)) for number, item in enumerate(node.value)]
-        found: dict[str, Any] = {}
-        own: dict[str, int] = {}
+        found, own = dict[str, Any](), dict[str, int]()
         for key, value in node.value:  # what is merged comes first, from elsewhere in the file
             inside, line = (*path, key.value), key.start_mark.line + 1
             name = self.text(key, inside)

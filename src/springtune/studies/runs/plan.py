@@ -101,8 +101,7 @@ def stages() -> tuple[Stage, ...]:
 
 def stage_jobs(study: Study, folder: Path) -> dict[str, Job]:
     """Jobs of a study's stages by name; nothing is written."""
-    jobs: dict[str, Job] = {}
-    bundles: dict[str, dict[str, list[str]]] = {}
+    jobs, bundles = dict[str, Job](), dict[str, dict[str, list[str]]]()
     tasks: dict[str, dict[str, list[Task]]] = {}
     for kind in kinds():
         for stage in kind.stages if study.parts[kind.name] else ():
