@@ -84,9 +84,8 @@ class Multigrid:
         self._assemble, self._otherwise, self._points, self._besides = assemble, otherwise, points, besides
         matrix = assemble()
         self._held, self._places, self._product = held, np.flatnonzero(~held), cut_rows(matrix)
-        self.name = "multigrid"
+        self.name, self._certain = "multigrid", False
         self._direct: Factor | None = None
-        self._certain = False
         self._levels: list[_Level] = like._levels if like else []
         self._coarsest: Any = like._coarsest if like else None
         self._borrowed = self._coarsest is not None

@@ -124,10 +124,8 @@ class Energy(ABC):
     @cached_property
     def _parts(self) -> list[tuple[slice, "Energy"]]:
         """Energies of `CELLS_AT_ONCE` cells each, with their rows: fields of millions of cells take gigabytes."""
-        if (count := len(self.corners)) <= CELLS_AT_ONCE:
-            return [(slice(count), self)]
         own = {one.name: value for one in fields(self)[1:] if np.ndim(value := getattr(self, one.name))}
-        parts = [slice(start, start + CELLS_AT_ONCE) for start in range(0, count, CELLS_AT_ONCE)]
+        parts = [slice(start, start + CELLS_AT_ONCE) for start in range(0, len(self.corners), CELLS_AT_ONCE)]
         return [(rows, replace(self, **{name: value[rows] for name, value in own.items()})) for rows in parts]
 
     @cached_property

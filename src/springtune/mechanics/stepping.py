@@ -134,8 +134,7 @@ class _ExplicitSteps(Stepper):
     def __init__(self, motion: Moving, integrator: str, step: float, precision: str, threads: int) -> None:
         self.motion, self.step = motion, step
         self.half = integrator != "symplectic-euler"
-        self.kind = np.dtype(precision).type
-        network = motion.network
+        self.kind, network = np.dtype(precision).type, motion.network
         with np.errstate(divide="ignore"):
             self.inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
         half = 0.5 * motion.mass_damping * step

@@ -81,8 +81,7 @@ class _Model:
         self.points: list[list[float]] = []
         self.elements: list[tuple[str, np.ndarray]] = []
         self.sets: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
-        self.shown: dict[str, str] = {}
-        self.ranks: dict[str, int] = {}
+        self.shown, self.ranks = dict[str, str](), dict[str, int]()
         self.surfaces: list[str] = []
 
     def add(self, one: _Section) -> None:

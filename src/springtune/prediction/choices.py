@@ -14,7 +14,7 @@ from ..mesh.cells import Mesh
 from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text, quantity_errors
 from ..problem.loads import LOADS
-from ..problem.materials import AnyMaterial, Material
+from ..problem.materials import AnyMaterial, Material, Materials
 from ..problem.quantities import Status, choose, nearest
 from ..problem.shapes import Beam, Shape
 from ..reference.small_strain import ReferenceNotConvergedError
@@ -206,7 +206,7 @@ def reference_of(beam: Beam, material: Material, load: str) -> QuantityReference
 def predict(
     beam: Beam | Shape,
     mesh: Mesh | GroupedMesh,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
+    material: Materials,
     known: References | None = None,
     *,
     loads: Iterable[str] = USUAL_LOADS,
@@ -279,7 +279,7 @@ def predict(
 def trial(
     beam: Beam | Shape,
     mesh: Mesh | GroupedMesh,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
+    material: Materials,
     known: References | None = None,
     *,
     loads: Iterable[str] = USUAL_LOADS,
@@ -299,9 +299,7 @@ def trial(
     return Trial(under_loads, {one.load: known[one.load] for one in under_loads}, also=more)
 
 
-def beam_problems(
-    beam: Beam, mesh: Mesh | GroupedMesh, material: AnyMaterial | Mapping[str, AnyMaterial], loads: Iterable[str]
-) -> list[BeamProblem]:
+def beam_problems(beam: Beam, mesh: Mesh | GroupedMesh, material: Materials, loads: Iterable[str]) -> list[BeamProblem]:
     """Boundary-value problems of 1 N in linear kinematics, one for each load."""
     first, *others = check_loads(loads)
     one = BeamProblem(beam, mesh, material, first, 1.0, "linear")
@@ -388,8 +386,7 @@ class Trial:
         suited = (one for one in DEFINITIONS.values() if _suits(one, self.mesh, self.materials))
         cheap_first = [one.name for one in sorted(suited, key=lambda one: one.cost)]
         self.names = [*dict.fromkeys((*(cheap_first if among is None else among), *self._also))]
-        self.same: dict[str, str] = {}
-        self.failures: dict[str, dict[str, str]] = {}
+        self.same, self.failures = dict[str, str](), dict[str, dict[str, str]]()
 
     def springs(self, name: str) -> Springs | None:
         """Springs of a definition, derived once; None with a reason in `failures`."""

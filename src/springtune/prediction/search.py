@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count, takewhile
@@ -16,7 +16,7 @@ from ..mesh.free import mesh_shape
 from ..mesh.rows import ROW_HEIGHT
 from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text
-from ..problem.materials import AnyMaterial, Material
+from ..problem.materials import Material, Materials
 from ..problem.quantities import quantity, whole_number
 from ..problem.shapes import Beam, Shape
 from ..safe_io import Tabled, mesh_size_text, number_of
@@ -227,7 +227,7 @@ def asked_error(value: float | str, name: str = "error") -> float:
 
 def find_mesh(
     beam: Beam | Shape,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
+    material: Materials,
     error: float | str,
     *,
     loads: Iterable[str] = USUAL_LOADS,
@@ -336,9 +336,7 @@ def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: s
     return _Family(name, min(box), one_cell, partial(make.particles, *box), problems)
 
 
-def _shape_family(
-    shape: Shape, material: AnyMaterial | Mapping[str, AnyMaterial], load: str, make: Callable[[float], GroupedMesh]
-) -> _Family:
+def _shape_family(shape: Shape, material: Materials, load: str, make: Callable[[float], GroupedMesh]) -> _Family:
     """Meshes of a shape under a load case."""
     if shape.file:
         why = "has the mesh of its file, so there is none to be found"

@@ -510,6 +510,8 @@ CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")  # constants of a sheet i
 
 AnyMaterial = Material | AnisotropicMaterial  # materials of a sheet
 
+Materials = AnyMaterial | Mapping[str, AnyMaterial]  # one, or those of the parts of a body by name
+
 
 class EngineeringConstants(NamedTuple):
     """Engineering constants of a sheet along two axes, as coupons show them: moduli [Pa] and Poisson's ratio [1].

@@ -11,7 +11,7 @@ from ..linalg.factors import SingularError, entry_places, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.sheets import GroupedMesh, check_held
 from ..mesh.sides import in_words
-from ..problem.materials import AnyMaterial
+from ..problem.materials import AnyMaterial, Materials
 from ..problem.shapes import LoadCase, Quantity, Shape, check_names
 from . import triangles
 from .answers import most_rotation_and_strain
@@ -90,7 +90,7 @@ class ShapeReference:
 def solve_shape(
     shape: Shape,
     load: LoadCase,
-    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    materials: Materials,
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
     level_of: "Callable[[Problem, int], Level] | None" = None,
@@ -150,7 +150,7 @@ def solve_shape(
 def solve_each(
     shape: Shape,
     load: LoadCase,
-    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    materials: Materials,
     grouped: GroupedMesh | None = None,
     solve: Callable[..., ShapeReference] | None = None,
 ) -> tuple[list[ShapeReference], dict[str, str]]:

@@ -17,7 +17,7 @@ from ..mesh.sheets import GroupedMesh, box_fault, part_names, parts_of
 from ..mesh.sides import OutlineSide, distances, in_words
 from ..problem import boundary
 from ..problem.loads import LOADS, Load, LoadKind
-from ..problem.materials import AnyMaterial, Material, materials_by_part
+from ..problem.materials import AnyMaterial, Material, Materials, materials_by_part
 from ..problem.quantities import choose, positive
 from ..problem.shapes import Beam, LoadCase, Quantity, Shape, warn_of_body
 from ..reference.answers import beyond_linear
@@ -179,7 +179,7 @@ class BeamProblem(BoundaryProblem):
         self,
         beam: Beam,
         mesh: Mesh | GroupedMesh,
-        material: AnyMaterial | Mapping[str, AnyMaterial],
+        material: Materials,
         load: str | Load,
         force: float | str | None,
         kinematics: str,
@@ -237,7 +237,7 @@ class ShapeProblem(BoundaryProblem):
         self,
         shape: Shape,
         grouped: GroupedMesh | Mesh,
-        material: AnyMaterial | Mapping[str, AnyMaterial],
+        material: Materials,
         load: str,
         scale: float,
         kinematics: str,
@@ -358,7 +358,7 @@ def scaled(case: LoadCase, scale: float) -> LoadCase:
     )
 
 
-def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: GroupedMesh) -> dict[str, AnyMaterial]:
+def _materials(material: Materials, grouped: GroupedMesh) -> dict[str, AnyMaterial]:
     """Return the material of each part of the mesh; refuse missing and unknown ones."""
     parts = parts_of(grouped)
     given = dict(material) if isinstance(material, Mapping) else {"": material}

@@ -19,7 +19,7 @@ from ..mesh.cells import Mesh, share_edges
 from ..mesh.sheets import GroupedMesh
 from ..problem.boundary import box, displacement_weights, even_weights, support_directions
 from ..problem.loads import LoadKind
-from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, check_isotropic
+from ..problem.materials import AnisotropicMaterial, Material, Materials, check_isotropic
 from ..problem.quantities import Status, choose, positive
 from ..problem.shapes import Beam, Shape
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
@@ -148,7 +148,7 @@ class MeshCache:
     def derive(
         self,
         definition: AnyDefinition,
-        material: AnyMaterial | Mapping[str, AnyMaterial],
+        material: Materials,
         stiffness: float | None = None,
         case: tuple[LoadKind | Loading, float, np.ndarray | None] | None = None,
         grouped: GroupedMesh | None = None,

@@ -20,7 +20,7 @@ from ..mesh.free import mesh_shape as mesh_outlined
 from ..mesh.sheets import GroupedMesh
 from ..problem.compare import error_text, quantity_errors, sign_word
 from ..problem.loads import KINEMATICS
-from ..problem.materials import AnyMaterial
+from ..problem.materials import Materials
 from ..problem.quantities import Status, choose, positive
 from ..problem.shapes import QUANTITY_UNITS, AssumptionWarning, Beam, Shape
 from ..registry import hook
@@ -250,7 +250,7 @@ class Scene(Tabled):
         self,
         beam: Beam | Shape,
         mesh: Mesh | GroupedMesh,
-        material: AnyMaterial | Mapping[str, AnyMaterial],
+        material: Materials,
         load: str,
         force: float | str | None = None,
         *,
