@@ -473,9 +473,8 @@ def test_files_of_shapes_balance_by_what_they_hold_alone(load, tmp_path):
     held, forces = held_and_loaded(sofa, len(moved))
     found = {"SOFA": (rows[:, :2].astype(int), rows[:, 2], rows[:, 4], held[:, :2], forces[:, :2])}
     xpbd = json.loads(written(one, tmp_path, ".xpbd.json"))
-    pairs, lengths, compliance = (
-        np.array(xpbd["constraints"][key]) for key in ("particles", "rest_lengths", "compliance")
-    )
+    names = ("particles", "rest_lengths", "compliance")
+    pairs, lengths, compliance = (np.array(xpbd["constraints"][name]) for name in names)
     held = np.zeros(moved.shape, dtype=bool)
     for particle, axis in xpbd["held_directions"]:
         held[particle, axis] = True

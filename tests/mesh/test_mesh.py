@@ -287,11 +287,8 @@ class TestSlits:
         points = np.vstack([mesh.points, (1 - share) * mesh.points[a] + share * mesh.points[b]])
         halves = [np.where(corners == end, new, corners) for end in (a, b)]
         path = tmp_path_factory.mktemp("hanging") / "mesh.vtu"
-        cells, said = (
-            np.vstack([np.delete(mesh.triangles, cell, axis=0), halves]),
-            "hangs on the edge from .* split the",
-        )
-        refuse(path, points, {3: cells}, said + " cell of that edge there", length, height)
+        cells = np.vstack([np.delete(mesh.triangles, cell, axis=0), halves])
+        refuse(path, points, {3: cells}, "hangs on the edge from .* split the cell of that edge there", length, height)
 
 
 @cases

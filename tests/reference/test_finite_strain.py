@@ -131,9 +131,8 @@ def test_slender_cantilevers_are_elasticas(nu, load):
 
 
 def test_bending_is_odd_in_the_force():
-    up, down = (
-        solve_finite_strain(BLOCK, Material(1e6, 0.45, name="rubber"), force, kind=BENDING) for force in (0.02, -0.02)
-    )
+    rubber = Material(1e6, 0.45, name="rubber")
+    up, down = (solve_finite_strain(BLOCK, rubber, force, kind=BENDING) for force in (0.02, -0.02))
     assert up.displacement == pytest.approx(-down.displacement, rel=1e-8)
     assert up.positions[[0, -1]].tolist() == [0, 1] and len(up.profile) == len(up.positions)
 
