@@ -105,7 +105,7 @@ results/quick/dataset.nc: | $(VENV)/.run
 	snakemake --configfile config/quick.yaml
 
 # The pictures and tables of the pages, from their studies, and what is measured on this machine: docs/scale.md and a
-# million particles in docs/speed.md. Half an hour and 3 GB. `make million JUDGE=/other/.venv/bin/python` compares solves.
+# million particles in docs/speed.md. Half an hour and 2 GB. `make million JUDGE=/other/.venv/bin/python` compares solves.
 pictures: $(VENV)/.run $(ENGINES)/.done
 	$(WITH_ENGINES) python tools/pictures.py
 	python tools/pages.py

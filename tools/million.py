@@ -1,6 +1,6 @@
 """Measure a million particles and an unstable equilibrium; `make pictures` writes the tables into docs/speed.md.
 
-Each case runs in a process of its own, whose peak is that of its memory: minutes and 3 GB in all. `copies` is the time
+Each case runs in a process of its own, whose peak is that of its memory: minutes and 2 GB in all. `copies` is the time
 of a solve over that of copying `MOVED_BYTES` in memory. `--judge PYTHON` runs the scenes in turns with the springtune
 of another environment, and adds the ratio to its solves.
 """
