@@ -100,7 +100,7 @@ def test_a_motion_that_snaps_says_so_where_it_comes_to_rest(share, says):
     load = share * limit(problem)[0]
     run = relax(problem.network, load * problem.network.expand(problem.load))
     assert run.status == "rest" and (says in run.message if says else run.message == "")
-    assert ("at rest where a load that grows slowly does not lead" in run.message) == bool(says)
+    assert ("at rest in an equilibrium that a slowly growing load does not reach" in run.message) == bool(says)
 
 
 @pytest.mark.parametrize("definition", ["uniform", "neo-hooke", "delingette"])

@@ -151,7 +151,7 @@ def test_another_ones_file_of_configuration_may_be_the_study(others):
 
 def test_hooks_of_another_workflow_may_call_ours(others):
     """For the lock and the summary."""
-    own = "onstart:\n    springtune.begin()\nonsuccess:\n    springtune.end('ending')\n"
+    own = "onstart:\n    springtune.begin()\nonsuccess:\n    springtune.end('success_report')\n"
     code, told = others("results/mine/done/mesh_0.json", added=own)
     assert code == 0 and "There is no dataset yet." in told, told
 
