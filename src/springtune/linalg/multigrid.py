@@ -67,7 +67,7 @@ class Multigrid:
     unknowns n, a factorization's as n^(3/2) and n log n. Method: J. Xu, The auxiliary space method and optimal
     multigrid preconditioning techniques for unstructured grids, Computing 56:215, 1996.
 
-    `assemble` returns the matrix, again if grids of its own are laid later: one of a million particles takes 100 MB.
+    `assemble` returns the matrix; it is called again if own grids are laid later, since keeping one takes much memory.
     `points` (n_points, 2) are in m, and `held` (n_points, 2) marks directions that cannot move. `besides` is a matrix
     (2 n_points, 2 n_points) added in products alone. `name` is ``"multigrid"``, or that of the factor that took over.
     """

@@ -74,7 +74,7 @@ class Energy(ABC):
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
         """Derivative of the energy by the corners' positions [m], shape (n_cells, m, 2)."""
-        field = np.asfortranarray(displacements)
+        field = np.asfortranarray(displacements)  # as `_at_corners` reads it, so that no part copies it
         parts = [part._forces(part._at_corners(field)) for _, part in self._parts]
         return np.concatenate(parts, axis=-1).transpose(2, 1, 0)
 

@@ -225,9 +225,10 @@ class Network:
 
     def _spring_couplings(self, displacements: np.ndarray | None) -> np.ndarray:
         """Share of the springs in `_couplings`."""
-        vectors, squares, ratio = self.rest_vectors, self.rest_lengths**2, np.ones(len(self.rest_lengths))
-        if displacements is not None:
-            vectors = vectors + self.end_differences(displacements)
+        if displacements is None:
+            vectors, squares, ratio = self.rest_vectors, self.rest_lengths**2, np.ones(len(self.rest_lengths))
+        else:
+            vectors = self.rest_vectors + self.end_differences(displacements)
             squares = np.einsum("ij,ij->i", vectors, vectors)
             ratio = self.rest_lengths / np.sqrt(squares)
         along = self.stiffness * ratio / squares

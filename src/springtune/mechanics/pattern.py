@@ -177,11 +177,10 @@ class Pattern:
 
     def _own(self, couplings: np.ndarray) -> np.ndarray:
         """Return xx, xy and yy of each particle's own block, shape (3, n_points)."""
-        count = self.shape[0]
-        own = np.empty((3, count))
+        own = np.empty((3, self.shape[0]))
         for place, (a, d) in enumerate([(0, 0), (0, 1), (1, 1)]):
-            own[place] = -np.bincount(self.first, couplings[a, d], count)
-            own[place] -= np.bincount(self.second, couplings[d, a], count)
+            own[place] = -np.bincount(self.first, couplings[a, d], self.shape[0])
+            own[place] -= np.bincount(self.second, couplings[d, a], self.shape[0])
         return own
 
     def row_sums(self, couplings: np.ndarray) -> np.ndarray:
