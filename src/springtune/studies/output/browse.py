@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import jinja2
 import numpy as np
@@ -467,4 +467,7 @@ def main(dataset: str, output: str, record: str, digest: str, *files: str) -> No
 
 
 if __name__ == "__main__":
+    sys.modules["pint"] = cast(
+        Any, None
+    )  # xarray would import it, in a sixth of a second, to ask whether arrays are its
     main(*sys.argv[1:])

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -136,6 +136,7 @@ if __name__ == "__main__":
     import fontTools.subset
 
     os.environ["MPLBACKEND"] = "Agg"
+    sys.modules["pint"] = cast(Any, None)  # see `browse`
     gc.set_threshold(100_000, 20, 100)  # looking for garbage among figures takes a tenth of the drawing
     # A PDF has the place of each letter; reading how a font would place them takes a third of its time.
     # Not public: without these defaults PDFs are drawn more slowly.
