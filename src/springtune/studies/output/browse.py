@@ -467,7 +467,6 @@ def main(dataset: str, output: str, record: str, digest: str, *files: str) -> No
 
 
 if __name__ == "__main__":
-    sys.modules["pint"] = cast(
-        Any, None
-    )  # xarray would import it, in a sixth of a second, to ask whether arrays are its
+    # xarray would import it, in a sixth of a second, to ask whether arrays are its own.
+    sys.modules["pint"] = cast(Any, None)
     main(*sys.argv[1:])

@@ -89,8 +89,8 @@ def file_digest(path: Path) -> str:
 def read_digests(folder: Path) -> None:
     """Take over the digests that a study has noted; none if they are damaged or another version made them."""
     note = read_note(folder / DIGESTS)
-    if note.get("checksum") == _checksum_of_digests(found := note.get("digests")):
-        NOTED.update(found)
+    if note.get("checksum") == _checksum_of_digests(note.get("digests")):
+        NOTED.update(note["digests"])
 
 
 def write_digests(folder: Path) -> None:
