@@ -19,7 +19,7 @@ MATERIALS = {
     "rubber": st.Material("1 MPa", 0.45, **SOFT),
     "incompressible": st.Material("1 MPa", 0.5, **SOFT),
     "foam": st.Material("1 MPa", 0.1, **SOFT),
-    "yeoh": st.Rubber([0.17e6, -5e3, 2e3], **SOFT),
+    "yeoh": st.Rubber([0.17e6, 0.1e6, 0.05e6], **SOFT),
     "woven": st.AnisotropicMaterial.orthotropic("2 MPa", "1 MPa", 0.4, "0.3 MPa", **SOFT),
 }
 CASES = beside(__file__)["CASES"]
@@ -52,7 +52,7 @@ def off(one, substeps, **options):
 
 @pytest.mark.parametrize("case", slow_but(QUICK[1:], CASES))
 def test_energies_come_to_our_equilibrium_with_the_second_order_in_the_step(case):
-    one = scene(case)
+    one = scene(case, share=0.5 if case == "yeoh" else 0.05)  # its law stiffens at large strain
     coarse, fine = (off(one, substeps, tolerance=1e-7) for substeps in (100, 200))
     assert fine < 1e-3
     assert 3 < coarse / fine < 5
@@ -70,7 +70,7 @@ def test_ten_scenes_in_half_the_largest_explicit_step(case, definition):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["delingette", "neo-hooke, foam", "yeoh"])
+@pytest.mark.parametrize("case", ["delingette", "neo-hooke, foam"])
 def test_energies_are_exact_at_large_strain(case):
     assert off(scene(case, share=0.5), 200, tolerance=1e-6) < 2e-3
 
@@ -181,6 +181,9 @@ def test_a_solver_written_from_the_file_alone_comes_to_our_equilibrium(case, tmp
     [path] = one.springs.write(tmp_path / "net.xpbd.json", errors=False)
     net = json.loads(path.read_text())
     assert set(net) == {"header", "content", *net["content"]}
+    # First steps are ours, too; the volume of compressible rubber is found by differences here, to some 2e-7.
+    begun = st.in_engine(one, "xpbd", dt=net["time_step"], substeps=1, iterations=2, frames=2).displacements
+    assert run(net, steps=2, sweeps=2, share=1.0) == pytest.approx(begun, abs=1e-6 * np.abs(begun).max())
     exact = one.solve().displacements
     assert np.array(net["displacements"]) == pytest.approx(exact, abs=1e-9 * np.abs(exact).max())
     found = run(net, steps=200, sweeps=4, share=0.5)
