@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import springtune as st
-from springtune.mechanics.continuation import buckling, follow, smallest_share
+from springtune.mechanics.continuation import _limit_load, buckling, follow, smallest_share
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.problem.boundary import weights
@@ -40,6 +40,14 @@ def test_a_path_goes_through_a_limit_point():
     at_limit = np.sqrt(rest ** (2 / 3) - 1) - rise
     assert (path.negative_pivots == (w < at_limit)).all()
     assert path.negative_pivots[-1] == 1 and abs(path.loads[-1]) < abs(path.loads).max()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_limit_load_is_the_top_of_the_parabola_through_three_points(sign):
+    way = np.array([0.0, 1.0, 1.8, 2.5])
+    loads = [*(sign * (3 - (way - 2) ** 2))]
+    assert _limit_load([*way], loads) == pytest.approx(sign * 3, rel=1e-9)
+    assert _limit_load([1.8, 2.5], loads) == loads[-2]
 
 
 @pytest.mark.parametrize("definition", ["delingette", "patch"])

@@ -523,6 +523,14 @@ def test_a_turning_point_is_no_rest():
     assert found.status == "moving" and "not at rest" in found.message
 
 
+@pytest.mark.parametrize("factor, at_rest", [(0.99, True), (1.01, False)])
+def test_at_rest_a_motion_has_little_of_the_energy_of_its_load(factor, at_rest):
+    """In balance at u = f / k, with v^2 / 2 against (1e-3)^2 f u."""
+    pull = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]])
+    motion = oscillator(load=pull)
+    assert motion._at_rest(pull, factor * np.sqrt(2) * 1e-3 * pull, 1e-3, np.zeros((3, 2)), 0.0) == at_rest
+
+
 def test_a_run_through_inverted_triangles_is_reported():
     """Pushed far beyond what springs carry, they pass through each other and come to rest: no answer."""
     motion = damped(beam(force=-2e6, size=0.01))
