@@ -525,7 +525,7 @@ def test_a_turning_point_is_no_rest():
 
 @pytest.mark.parametrize("rest, status", [(0.49, "moving"), (0.51, "rest")])
 def test_at_rest_a_motion_has_little_of_the_energy_of_its_load(rest, status):
-    """Where the residual of one particle let go is r, its energy (1 - r^2) f^2 / 2k is at most r^2 f u from r = 1/2 on."""
+    """One particle let go: at a residual r its energy (1 - r^2) f^2 / 2k is at most r^2 f u from r = 1/2 on."""
     motion = oscillator(load=np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]]))
     assert motion.run("central-difference", 1e-4, 70_000, rest=rest).status == status
 
