@@ -120,7 +120,7 @@ def test_numbers_of_the_catalogue_are_those_of_the_code(catalogue):
     """To the digit that rounding leaves; searches end elsewhere on other machines."""
     tool, _ = catalogue
     for old, new in zip(tool["stored"](), tool["measured"](), strict=True):
-        if old["definition"] in ("annealed", "evolved", "adjoint"):
+        if old["definition"] in ("annealed", "evolved", "adjoint", "best-springs"):
             continue
         for name, cell in old.items():
             before, now = (re.split(r"([+-]?\d+\.?\d*)", text) for text in (cell, new[name]))
