@@ -249,7 +249,6 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     entries.
     """
     count, joined = len(points), _joined(len(points), edges)
-    pointers, neighbours = joined.indptr, joined.indices
     order, low = np.empty(count, dtype=np.int64), np.zeros(count, dtype=bool)
     waiting = [(np.arange(count), 0)]
     while waiting:
@@ -259,16 +258,11 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
             continue
         x, y = points[part, 0], points[part, 1]
         along, across = (x, y) if x.max() - x.min() >= y.max() - y.min() else (y, x)
-        below = along < np.partition(along, len(part) // 2)[len(part) // 2]
+        middle = np.partition(along, len(part) // 2)[len(part) // 2]
+        below = along < middle if middle > along.min() else along <= middle  # half of them may be on the first line
         left, right = part[below], part[~below]
-        if not len(left):  # all on one line across
-            order[start : start + len(part)] = part[np.argsort(across, kind="stable")]
-            continue
         low[left] = True
-        lengths = pointers[right + 1] - pointers[right]
-        # All neighbours of all particles of the right part, one after the other.
-        places = np.repeat(pointers[right] - np.r_[0, np.cumsum(lengths)[:-1]], lengths) + np.arange(lengths.sum())
-        touches = np.logical_or.reduceat(low[neighbours[places]], np.r_[0, np.cumsum(lengths)[:-1]])
+        touches = joined[right] @ low
         low[left] = False
         separator, right = right[touches], right[~touches]
         separator = separator[np.argsort(across[~below][touches], kind="stable")]
@@ -278,9 +272,9 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _joined(count: int, edges: np.ndarray) -> csr_array:
-    """Neighbours of each particle, one particle's after another's."""
+    """Whether two particles are neighbours, both ways."""
     first, second = edges.T
-    ones = np.ones(2 * len(edges), dtype=np.int8)
+    ones = np.ones(2 * len(edges), dtype=bool)
     return csr_array((ones, (np.r_[first, second], np.r_[second, first])), shape=(count, count))
 
 

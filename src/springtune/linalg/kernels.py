@@ -32,8 +32,6 @@ class Chunks(NamedTuple):
     rows_between: np.ndarray
     columns_between: np.ndarray
     blocks_between: np.ndarray
-    rows_added: np.ndarray
-    added: np.ndarray
 
 
 class Grid(NamedTuple):
@@ -145,7 +143,7 @@ def sweep_up(first: int, last: int, matrix: Chunks, right: Field, u: Field, know
 
 @compiled
 def couple(matrix: Chunks, u: Field, forces: Field) -> float:
-    """Add the forces between chunks, less what their diagonals have besides, and return their work."""
+    """Add the forces between chunks, and return their work; a row's coupling with itself counts twice, as any other."""
     work = 0.0
     for e in range(len(matrix.rows_between)):
         i, j = matrix.rows_between[e], matrix.columns_between[e]
@@ -156,10 +154,6 @@ def couple(matrix: Chunks, u: Field, forces: Field) -> float:
         forces[i, 1] += y
         forces[j, 0] += xx * u[i, 0] + yx * u[i, 1]
         forces[j, 1] += xy * u[i, 0] + yy * u[i, 1]
-    for k in range(len(matrix.rows_added)):
-        i = matrix.rows_added[k]
-        forces[i, 0] -= matrix.added[k, 0] * u[i, 0]
-        forces[i, 1] -= matrix.added[k, 1] * u[i, 1]
     return work
 
 

@@ -278,29 +278,32 @@ def cut_rows(matrix: Blocks, dtype: Any = float) -> Chunks:
     between = rows, columns[crossing].astype(np.int64), blocks[crossing]
     # In their places are couplings of a row with itself, of nothing.
     columns[crossing], blocks[crossing] = rows, 0
-    nothing = rows[:0], np.empty((0, 2), dtype)
-    return Chunks(starts, matrix.pointers, columns, blocks, matrix.diagonal, *between, *nothing)
+    return Chunks(starts, matrix.pointers, columns, blocks, matrix.diagonal, *between)
 
 
 def smoother(matrix: Blocks) -> Chunks:
     """Return a matrix for Gauss-Seidel sweeps, in single precision; refuse indefinite diagonal blocks.
 
     Chunks are coupled by Jacobi's method. Half the size of these couplings is added to the diagonal, which keeps any
-    preconditioner positive definite (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864, 2011).
+    preconditioner positive definite (A. Baker, R. Falgout, T. Kolev and U. Yang, SIAM J. Sci. Comput. 33:2864, 2011),
+    and taken off again between the chunks.
     """
+    xx, xy, yy = matrix.diagonal.T
+    if (xx < 0).any() or (yy < 0).any() or ((xx * yy <= xy * xy) & ((xx * yy > 0) | (xy != 0))).any():
+        raise LinAlgError("a particle or node without stiffness")
     chunks, added = cut_rows(matrix, np.float32), np.zeros((len(matrix.diagonal), 2))
     sizes = 0.5 * np.abs(chunks.blocks_between.astype(float).reshape(-1, 2, 2))
     np.add.at(added, chunks.rows_between, sizes.sum(axis=2))
     np.add.at(added, chunks.columns_between, sizes.sum(axis=1))
     near = np.flatnonzero(added.any(axis=1))
-    xx, xy, yy = matrix.diagonal.T
-    if (xx < 0).any() or (yy < 0).any() or ((xx * yy <= xy * xy) & ((xx * yy > 0) | (xy != 0))).any():
-        raise LinAlgError("a particle or node without stiffness")
+    taken_off = -0.5 * added[near, :, None] * np.eye(2)
+    blocks = np.concatenate([chunks.blocks_between, taken_off.reshape(-1, 4)], dtype=np.float32)
+    rows, columns = (np.concatenate([own, near]) for own in (chunks.rows_between, chunks.columns_between))
     xx, yy = xx + added[:, 0], yy + added[:, 1]
     # What is held has zeros, as its inverse has; a 1 stands for it in between.
     one, other = np.where(xx > 0, xx, 1.0), np.where(yy > 0, yy, 1.0)
     inverse = np.stack([(xx > 0) * other, -xy, (yy > 0) * one], axis=1) / (one * other - xy * xy)[:, None]
-    return chunks._replace(diagonal=inverse.astype(np.float32), rows_added=near, added=added[near].astype(np.float32))
+    return Chunks(*chunks[:4], inverse.astype(np.float32), rows, columns, blocks)
 
 
 def first_grid(points: np.ndarray, coarsening: float) -> Grid:
