@@ -323,18 +323,12 @@ def quality(mesh: Mesh) -> dict[str, float]:
 MOST_MESH_PARTICLES = 5_000_000  # particles beyond which no mesh is made: its edges alone take gigabytes
 
 
-LARGEST_SIZE = 1000.0
-"""Mesh size over the smaller side of a box from which it is taken for an error: cells become slivers [1]."""
-
-
 def check_box(length: float, height: float, size: float) -> None:
     """Refuse a box that cannot be meshed."""
     for name, value in (("length", length), ("height", height), ("size", size)):
         number = isinstance(value, Real) and not isinstance(value, bool)
         if not (number and 1e-40 <= value <= 1e40):
             raise MeshError(f"{name}: {value!r} is not a number above zero; give one in m")
-    if size > LARGEST_SIZE * min(length, height):
-        raise MeshError(f"size: {size!r} is no size of {length:g} x {height:g} m; give at most {min(length, height):g}")
     if not max(length / size, 1.0) * max(height / size, 1.0) <= 2 * MOST_MESH_PARTICLES:
         least = f"{1e3 * math.sqrt(length * height / MOST_MESH_PARTICLES):.2g} mm"
         raise MeshError(f"size: {size!r} makes too many particles of {length:g} x {height:g} m; give at least {least}")
