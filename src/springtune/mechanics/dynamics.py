@@ -16,7 +16,7 @@ from scipy.sparse.linalg import eigsh
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
-from ..mesh.sheets import free_motion
+from ..problem.boundary import free_motion
 from ..safe_io import Tabled
 from . import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED_INTEGRATORS, PRECISIONS, BackwardEuler
 from .network import Network

@@ -19,7 +19,7 @@ from scipy.sparse import csc_array
 from ..linalg import SOLVERS
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
 from ..mesh.cells import Mesh
-from ..mesh.sheets import check_held
+from ..problem.boundary import check_held
 from .energies import Energy
 from .pattern import Pattern
 

@@ -1,4 +1,4 @@
-"""Meshes with named groups; checks that they are plane sheets, fill a box, and are held; what mesh files have."""
+"""Meshes with named groups; checks that they are plane sheets, and fill a box; what mesh files have."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -178,41 +178,6 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
         return np.zeros(count, dtype=np.int32)
     joined = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
-
-
-def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
-    """Refuse supports that leave a connected body free to move, unless all its points are held."""
-    components = connected(edges, len(points))
-    count = components.max() + 1
-    for number in range(count):
-        own, fixed = points[components == number], held[components == number]
-        if not fixed.all() and (free := free_motion(own, fixed)):
-            one = f"one of the {count} bodies that are not joined, at {in_words(own)},"
-            raise ValueError(f"{where}: its supports leave {one if count > 1 else 'the body'} free to {free}; hold it")
-
-
-def free_motion(points: np.ndarray, held: np.ndarray) -> str:
-    """Return a rigid motion that supports leave free, in words, or an empty string; all arrays are (n_points, 2).
-
-    >>> free_motion(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[True, True], [False, False]]))
-    'turn about (0, 0) mm'
-    """
-    middle = points.mean(axis=0)
-    x, y = ((points - middle) / (np.ptp(points, axis=0).max() or 1.0)).T
-    across, along = -y[held[:, 0]], x[held[:, 1]]
-    rows = np.zeros((len(across) + len(along), 3))
-    rows[: len(across), 0], rows[len(across) :, 1], rows[:, 2] = 1.0, 1.0, np.concatenate([across, along])
-    sizes, motions = np.linalg.eigh(rows.T @ rows)
-    if sizes[0] > 1e-12 * max(sizes[-1], 1.0):
-        return ""
-    if sizes[1] <= 1e-12 * max(sizes[-1], 1.0):
-        return "move and turn"
-    u, v, turn = motions[:, 0]
-    if abs(turn) > 1e-6:
-        size = np.ptp(points, axis=0).max()
-        about = middle + np.array([-v, u]) / turn * size
-        return f"turn about {in_words(np.where(np.abs(about) > 1e-9 * size, about, 0.0))}"
-    return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")
 
 
 def bonded(mesh: Mesh, reach: float) -> Mesh:

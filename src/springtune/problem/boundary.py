@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..mesh.cells import Mesh, no_cells, signed_areas
-from ..mesh.sheets import GroupedMesh, check_held, part_names, parts_of, side_fault
+from ..mesh.sheets import GroupedMesh, connected, part_names, parts_of, side_fault
 from ..mesh.sides import in_words
 from .loads import MIDDLE, LoadKind
 from .shapes import LoadCase, Quantity, check_names
@@ -227,3 +227,35 @@ def _in_body(grouped: GroupedMesh, name: str) -> bool:
         return bool(cell_at(grouped, name)[2].min() > -CELL_TOLERANCE)
     except ValueError:
         return False
+
+
+def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
+    """Refuse supports that leave a connected body free to move, unless all its points are held."""
+    components = connected(edges, len(points))
+    count = components.max() + 1
+    for number in range(count):
+        own, fixed = points[components == number], held[components == number]
+        if not fixed.all() and (free := free_motion(own, fixed)):
+            one = f"one of the {count} bodies that are not joined, at {in_words(own)},"
+            raise ValueError(f"{where}: its supports leave {one if count > 1 else 'the body'} free to {free}; hold it")
+
+
+def free_motion(points: np.ndarray, held: np.ndarray) -> str:
+    """Return a rigid motion that supports leave free, in words, or an empty string; all arrays are (n_points, 2).
+
+    >>> free_motion(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[True, True], [False, False]]))
+    'turn about (0, 0) mm'
+    """
+    middle, size = points.mean(axis=0), np.ptp(points, axis=0).max() or 1.0
+    x, y = ((points - middle) / size).T
+    one, none = np.ones_like(x), np.zeros_like(x)
+    rows = np.array([[one, none], [none, one], [-y, x]]).T[held]  # of each held direction by a unit of each motion
+    sizes, motions = np.linalg.eigh(rows.T @ rows)
+    free = (sizes <= 1e-12 * max(sizes[-1], 1.0)).sum()
+    if free != 1:
+        return "move and turn" if free else ""
+    u, v, turn = motions[:, 0]
+    if abs(turn) > 1e-6:
+        about = middle + np.array([-v, u]) / turn * size
+        return f"turn about {in_words(np.where(np.abs(about) > 1e-9 * size, about, 0.0))}"
+    return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")

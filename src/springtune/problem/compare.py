@@ -122,17 +122,6 @@ def _last_root(solve: Solve, reference: float, softness: float, unsolved: float,
     return None
 
 
-def largest_finer_errors(errors: np.ndarray) -> np.ndarray:
-    """Largest error of each mesh size and all finer ones that were run, since errors may cross zero by chance.
-
-    Arrays are (n_approaches, n_sizes), finest size first. NaN there, and from where a finer one failed.
-    """
-    run_on = np.isfinite(errors)
-    number = np.cumsum(run_on, axis=1)
-    largest = np.maximum.accumulate(np.where(number > 0, np.abs(errors), 0.0), axis=1)  # NaN from a NaN on
-    return np.where(run_on & (number > 1), largest, np.nan)
-
-
 def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     """Return whether no other case has a smaller error in no more time; False for NaN errors or times."""
     best = np.zeros(errors.shape, dtype=bool)

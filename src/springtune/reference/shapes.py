@@ -9,8 +9,9 @@ from scipy.sparse import coo_array
 
 from ..linalg.factors import SingularError, entry_places, factorize
 from ..mesh.cells import MeshError, signed_areas
-from ..mesh.sheets import GroupedMesh, check_held
+from ..mesh.sheets import GroupedMesh
 from ..mesh.sides import in_words
+from ..problem.boundary import check_held
 from ..problem.materials import AnyMaterial, Materials
 from ..problem.shapes import LoadCase, Quantity, Shape, check_names
 from . import triangles

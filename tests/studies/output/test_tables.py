@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.problem.compare import largest_finer_errors
 from springtune.studies.kinds.benchmark import figures as benchmark
 from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
+from springtune.studies.kinds.benchmark.solve import largest_finer_errors
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.moduli import figures as definitions

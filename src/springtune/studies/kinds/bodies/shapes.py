@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from springtune import units
 from springtune.mesh.cells import MeshError
-from springtune.mesh.sheets import free_motion
+from springtune.problem.boundary import free_motion
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import (
