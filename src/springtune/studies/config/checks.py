@@ -9,7 +9,7 @@ from typing import Any
 from springtune.mesh.cells import MESH_TYPES, too_many
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE_REASON
-from springtune.problem.quantities import MOST_SCENES, MOST_SCENES_VARIABLE, nearest
+from springtune.problem.quantities import MOST_SCENES, MOST_SCENES_VARIABLE
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
@@ -36,13 +36,6 @@ DEFINITION_REMEDY = "take another definition, or give each a grid of its own"
 
 
 # -- names -------------------------------------------------------------------------------------------------------------
-
-
-def check_known(problems: Problems, path: Place, what: str, name: str, names: Names, section: str | None) -> None:
-    """Check that a name is known; a `section` may declare it."""
-    if name not in names:
-        declared = f"; or declare it under {section}" if section else ""
-        problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}{declared}")
 
 
 def check_beam_material(problems: Problems, path: Place, name: str, config: StudyConfig) -> None:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import csv
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springtune.problem.materials import AnyMaterial, Material
-from springtune.problem.quantities import choose, shown_order
+from springtune.problem.quantities import choose
 from springtune.problem.shapes import Beam, Shape
 from springtune.registry import import_name
 
@@ -207,28 +206,6 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
     return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
-cache_by_study = lru_cache(maxsize=8)  # decorator of a function of a study whose last answers are kept
-
-
-def keeps_fields(study: Study) -> bool:
-    """Return whether a study's dataset has whole fields, its group `/fields`."""
-    return "deformed" in study.outputs or "paraview" in study.outputs
-
-
-def shown(scenes: Iterable[SceneSpec], swept: Iterable[str]) -> frozenset[SceneSpec]:
-    """Scenes on the coarsest mesh, with one value of each swept parameter."""
-    names, bodies, found = tuple(swept), defaultdict[tuple[str, ...], list[SceneSpec]](list), set[SceneSpec]()
-    for scene in scenes:
-        bodies[scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name, scene.load].append(scene)
-    for own in bodies.values():
-        coarsest = max(scene.mesh.mesh_size for scene in own)
-        there = [scene for scene in own if scene.mesh.mesh_size == coarsest]
-        ranks = [[shown_order(name, swept_value(one, one.mesh.beam, name)) for name in names] for one in there]
-        last = max(ranks)
-        found |= {scene for scene, rank in zip(there, ranks) if rank == last}
-    return frozenset(found)
-
-
 # -- study kinds -------------------------------------------------------------------------------------------------------
 
 _PACKAGES = Path(__file__).parents[1] / "kinds"
@@ -345,12 +322,6 @@ def stem(name: str, selection: Mapping[str, str]) -> str:
     return "_".join([name, *selection.values()])
 
 
-def distinct_cells(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Distinct selections of the dimensions `labels` among a study's cells, in order, by stem."""
-    chosen = [{label: cell[label] for label in labels} for cell in cells]
-    return {stem(name, one): one for one in chosen}
-
-
 def kind_files(name: str) -> list[Path]:
     """Files of a name in the packages of the study kinds."""
     return [path for kind in KINDS if (path := _PACKAGES / kind / name).is_file()]
@@ -373,10 +344,9 @@ def kinds() -> tuple[StudyKind, ...]:
 def outputs(*names: str) -> dict[str, Output]:
     """Outputs of study kinds by name: of all, or of as few as have some names, since importing a kind takes long."""
     apart, found = modules("outputs"), dict[str, Output]()
-    for kind in KINDS:
+    for package in (f"studies.kinds.{kind}" for kind in KINDS):
         if names and found.keys() >= {*names}:
             break
-        package = f"studies.kinds.{kind}"
         is_apart = f"{package}.outputs" in apart
         own = import_name(f"{package}.outputs:OUTPUTS") if is_apart else import_name(f"{package}.kind:KIND").outputs
         found |= {output.name: output for output in own}

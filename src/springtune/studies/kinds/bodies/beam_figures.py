@@ -11,11 +11,10 @@ from springtune.problem.loads import LOADS
 from springtune.problem.quantities import SWEPT, with_unit
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.model import distinct_cells
 from ...output import style
 from ...output.answers import plane_vectors, status_words
 from ...output.dataset import SHOWN_PREFIX, cells, choose, group, in_own_plane, labels_of, own_laws, sign_of_errors
-from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN
+from .outputs import SCENE_LABELS, SENSITIVITY_LABELS, SWEPT_SHOWN, distinct_cells
 from .shape_figures import draw_network, extent, magnification
 from .tables import at, beam_title, last_swept, own_references
 

@@ -17,11 +17,12 @@ from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.model import Reference, Study, declared, keeps_fields
+from ...config.model import Reference, Study, declared
 from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING_ATTRIBUTES, UGRID, Group
 from ...runs import store
 from . import any_reference, stored
 from . import kind as bodies
+from .kind import keeps_fields
 from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, has_pressure
 from .stored import FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names

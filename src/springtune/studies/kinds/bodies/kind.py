@@ -13,18 +13,19 @@ import numpy as np
 
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
+from springtune.problem.quantities import shown_order
 from springtune.problem.shapes import Beam, size_text
 from springtune.reference.answers import unit_problem, unit_scales
 from springtune.safe_io import aligned
 from springtune.springs.base import DEFINITIONS
 
-from ...config.model import SceneSpec, Stage, Study, StudyKind, cache_by_study, keeps_fields, shown
+from ...config.model import SceneSpec, Stage, Study, StudyKind, swept_value
 from ...runs import attempts
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.plan import Task
 from ...runs.source import checksum, hash_of, hash_of_text
 from . import shapes as of_shapes
-from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, mesh_name, stems
+from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, cache_by_study, mesh_name, stems
 from .stored import CALIBRATION_STEM
 
 Body = tuple[Beam, Material, str]
@@ -271,10 +272,22 @@ def curve_task(study, curve):
     return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.bodies.sensitivity"))} | task
 
 
+def keeps_fields(study):
+    """Return whether a study's dataset has whole fields, its group `/fields`."""
+    return "deformed" in study.outputs or "paraview" in study.outputs
+
+
 @cache_by_study
 def shown_scenes(study):
-    """Scenes with stored fields."""
-    return shown(study.scenes, study.swept)
+    """Scenes with stored fields: those on the coarsest mesh, with one value of each swept parameter."""
+    found = set()
+    for own in group_by(study.scenes, attrgetter("mesh.beam.name", "mesh.mesh_type", "material.name", "load")).values():
+        coarsest = max(scene.mesh.mesh_size for scene in own)
+        there = [scene for scene in own if scene.mesh.mesh_size == coarsest]
+        ranks = [[shown_order(name, swept_value(one, one.mesh.beam, name)) for name in study.swept] for one in there]
+        last = max(ranks)
+        found |= {scene for scene, rank in zip(there, ranks) if rank == last}
+    return frozenset(found)
 
 
 @cache_by_study

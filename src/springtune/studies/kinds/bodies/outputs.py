@@ -1,14 +1,14 @@
 """Outputs of beams and shapes: their figures and tables."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache, partial
 from operator import itemgetter
 from typing import Any
 
 from springtune.problem.loads import LOADS
 
-from ...config.model import Output, Study, cache_by_study, distinct_cells
+from ...config.model import Output, Study
 from ...config.model import stem as figure_stem
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
@@ -29,6 +29,15 @@ SWEPT_SHOWN = {
 PLOTS = "studies.kinds.bodies.beam_figures"
 
 TABLE_LABELS = ("load", "mesh_type", "material")  # dimensions with one label in a table, as in the paper
+
+
+cache_by_study = lru_cache(maxsize=8)  # decorator of a function of a study whose last answers are kept
+
+
+def distinct_cells(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Distinct selections of the dimensions `labels` among a study's cells, in order, by stem."""
+    chosen = [{label: cell[label] for label in labels} for cell in cells]
+    return {figure_stem(name, one): one for one in chosen}
 
 
 def stem(selection: Mapping[str, str], number: int | None = None) -> str:

@@ -8,6 +8,7 @@ from pydantic import Field
 from springtune.mechanics import PRECISIONS
 from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
+from springtune.problem.quantities import nearest
 from springtune.registry import import_name
 from springtune.springs.base import DEFINITIONS
 
@@ -124,16 +125,19 @@ def _check(config, problems):
     for name, runs in section.runs.items():
         place = "engines", "runs", name
         for engine in runs.engine:
-            checks.check_known(problems, (*place, "engine"), "engine", engine, _engines(), None)
+            if engine not in _engines():
+                problems.add((*place, "engine"), f"unknown engine '{engine}'; {nearest(engine, _engines())}")
         try:
             import_name("engines.base:Setting")(max(runs.dt))
         except ValueError as error:
             problems.add((*place, "dt"), str(error).removeprefix("dt: "))
         for one in runs.scene or section.scenes:
-            checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
-            if one in section.scenes:
-                scene = section.scenes[one]
-                checks.check_fit(problems, (*place, "definition"), runs.definition, [scene.mesh_type], [scene.load])
+            if one not in section.scenes:
+                known = nearest(one, section.scenes)
+                problems.add((*place, "scene"), f"unknown scene '{one}'; {known}; or declare it under engines.scenes")
+                continue
+            scene = section.scenes[one]
+            checks.check_fit(problems, (*place, "definition"), runs.definition, [scene.mesh_type], [scene.load])
         checks.check_product(problems, runs, place, RUN_KEYS, MOST_ENGINE_RUNS)
     lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in RUN_KEYS}
     lists["scene"] = {*section.scenes}
