@@ -186,7 +186,7 @@ def _summary(found: "Comparison", changed: int) -> str:
     groups = found.groups
     counts = [f"group {path} only {side}" for side, own in zip(COMPARED, found.only_groups) for path in own]
     for number, side in enumerate(COMPARED):
-        counts += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
+        counts += [f"{len(g.cells[number])} {_cells(g.name)} only {side}" for g in groups if g.cells[number]]
     unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in groups)
     counts += [f"{changed} values changed"] if changed else []
     counts += [f"{unlike} variables are only in one, or cannot be compared"] if unlike else []
@@ -209,9 +209,9 @@ def _only_in_one(group: "GroupChanges", most: int) -> Iterator[list[str]]:
     if labels:
         yield [f"labels of {group.name}", *labels]
     for side, cells in zip(COMPARED, group.cells):
-        if cells.count:
-            lines = [f"  {_place(group, one)}" for one in cells.rows]
-            yield [f"{_cells(group.name)} only {side}: {cells.count}", *lines, *_omitted(cells.count - len(lines))]
+        if cells:
+            lines = [f"  {_place(group, one)}" for one in cells[:most]]
+            yield [f"{_cells(group.name)} only {side}: {len(cells)}", *lines, *_omitted(len(cells) - len(lines))]
     variables = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
     if variables or group.unlike:
         yield [f"variables of {group.name}", *variables, *(f"  {name} {why}" for name, why in group.unlike.items())]

@@ -73,14 +73,6 @@ class VariableChanges(NamedTuple):
     rows: list[Change]
 
 
-@dataclass(frozen=True)
-class CellsOfOne:
-    """Cells of only one dataset: their number, and the labels of the first."""
-
-    count: int = 0
-    rows: Sequence[Labels] = ()
-
-
 @dataclass
 class GroupChanges:
     """Changes of a group; `labels` and `cells` are those of only one dataset, `sizes` count the labels of both."""
@@ -90,7 +82,7 @@ class GroupChanges:
     sizes: dict[str, int] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     labels: dict[str, tuple[list[str | float], ...]] = field(default_factory=dict)
-    cells: tuple[CellsOfOne, ...] = (CellsOfOne(), CellsOfOne())
+    cells: tuple[list[Labels], ...] = ([], [])
     unlike: dict[str, str] = field(default_factory=dict)
     flags: list[VariableChanges] = field(default_factory=list)
     values: list[VariableChanges] = field(default_factory=list)
@@ -98,8 +90,8 @@ class GroupChanges:
     @property
     def different(self) -> bool:
         """Whether the group differs."""
-        counts = [*(one.changed for one in (*self.flags, *self.values)), *(one.count for one in self.cells)]
-        return any([*counts, *self.variables, self.labels, self.unlike])
+        changed = (one.changed for one in (*self.flags, *self.values))
+        return any([*changed, *self.cells, *self.variables, self.labels, self.unlike])
 
 
 class Comparison(NamedTuple):
@@ -188,7 +180,7 @@ def _compare_group(
         if any(of_one) and all(data.sizes[name] and name in data.indexes for data in given):
             found.labels[name] = of_one
     if all("status" in data for data in pair) and not _why_unlike(*(data["status"] for data in pair)):
-        found.cells = _cells_of_one(asked, dimensions, most)
+        found.cells = _cells_of_one(asked, dimensions)
     both: tuple[Any, ...] = xr.align(*pair, *asked, join="inner", copy=False)
     for name in (name for name in names[0] if name in names[1]):
         arrays = [data[name] for data in both[:2]]
@@ -211,13 +203,12 @@ def _why_unlike(one: xr.DataArray, other: xr.DataArray) -> str:
     return f"has other units: {units[0]} before, {units[1]} after" if len(set(units)) > 1 else ""
 
 
-def _cells_of_one(asked: Arrays, dimensions: set[str], most: int | None) -> tuple[CellsOfOne, ...]:
+def _cells_of_one(asked: Arrays, dimensions: set[str]) -> tuple[list[Labels], ...]:
     """Cells that only one side requests, for each side."""
     masks = [mask.any([name for name in mask.dims if name not in dimensions]) for mask in asked]
     # On the labels of one side: the union of all may be the square of either.
     of_one = (mask & ~other.reindex_like(mask, fill_value=False) for mask, other in zip(masks, masks[::-1]))
-    found = (records(xr.Dataset(), cells, ()) for cells in of_one)
-    return tuple(CellsOfOne(len(rows), rows[:most]) for rows in found)
+    return tuple(records(xr.Dataset(), cells, ()) for cells in of_one)
 
 
 def _compare_variable(
