@@ -118,10 +118,7 @@ def _compress(content: bytes) -> str:
 
 def _library() -> dict[str, str]:
     """Read the scripts of BokehJS; importing Bokeh would take longer than making the page."""
-    found = find_spec("bokeh")
-    if found is None or found.origin is None:
-        raise FileNotFoundError("the package bokeh is not installed; `pip install bokeh` or `make study` installs it")
-    folder = Path(found.origin).parent / "server/static/js"
+    folder = Path(cast(Any, find_spec("bokeh")).origin).parent / "server/static/js"
     return {name: (folder / f"{name}.min.js").read_text(encoding="utf-8") for name in BOKEH_SCRIPTS}
 
 
