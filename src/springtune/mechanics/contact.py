@@ -30,6 +30,8 @@ from .network import FollowerPressure, Network
 
 REACH_SIZES = 2.0  # distance up to which corners and edges are watched, over the mesh size
 
+FLOOR_SIZES = 1e4  # half of the floor's width, and its depth, over the mesh size
+
 STRAIGHT_SINE = 1e-6  # sine of the angle below which two edges are taken for one line
 
 JOINT_DISTANCE = 1e-6
@@ -201,9 +203,10 @@ class Contact:
         size: float = 1e-3,
         friction: float = 0.0,
     ) -> None:
-        self.bodies, self.obstacles = list(bodies), list(obstacles)
-        self.floor, self.size, self.friction = floor, size, friction
-        self.all = self.bodies + self.obstacles
+        self.bodies, self.size, self.friction = list(bodies), size, friction
+        far = FLOOR_SIZES * size
+        below = [Obstacle(np.array([[-far, -far], [far, -far], [far, 0.0], [-far, 0.0]]))] if floor else []
+        self.all: list[Body | Obstacle] = [*bodies, *obstacles, *below]
         self.iterations, self.share = 0, 0.0
         self.contacts: Contacts | None = None
         self.forces, self.drag = np.zeros(0), np.zeros((0, 2))
@@ -217,21 +220,11 @@ class Contact:
         parts = [Contacts(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
         sides = [_Sides(body) for body in self.all]
         for owner in range(len(self.all)):
-            if self.floor and owner < len(self.bodies):
-                parts.append(_contacts(owner, -1, *self._near_floor(owner, sides[owner])))
             for target in range(len(self.all)):
                 if target != owner and min(owner, target) < len(self.bodies):
-                    near = self._near_edges(owner, sides[owner], target, sides[target])
-                    parts.append(_contacts(owner, target, *near))
+                    corners, *near = self._near_edges(owner, sides[owner], target, sides[target])
+                    parts.append(Contacts(np.full(len(corners), owner), corners, np.full(len(corners), target), *near))
         return Contacts(*map(np.concatenate, zip(*parts)))
-
-    def _near_floor(self, owner: int, sides: _Sides) -> tuple[np.ndarray, ...]:
-        """Corners of a body near the floor, and edges, shares, normals and gaps as in `Contacts`."""
-        places = self.all[owner].points[sides.corners]
-        near = places[:, 1] <= REACH_SIZES * self.size
-        count = int(near.sum())
-        edges, shares, normals = np.zeros((count, 2), int), np.zeros(count), np.tile([0.0, 1.0], (count, 1))
-        return sides.corners[near], edges, shares, normals, places[near, 1]
 
     def _near_edges(self, owner: int, own: _Sides, target: int, met: _Sides) -> tuple[np.ndarray, ...]:
         """Corners of one body near edges of another one, these edges, shares, normals and gaps."""
@@ -295,9 +288,8 @@ class Contact:
         """Largest depth of a corner inside another body or below the floor [m]."""
         corners = [one.points[np.unique(one.outline)] for one in self.all]
         sides = [one.points[one.outline].transpose(1, 0, 2) for one in self.all]
-        depths = [-places[:, 1].min() for places in corners[: len(self.bodies)] if self.floor]
         pairs = [pair for pair in permutations(range(len(self.all)), 2) if min(pair) < len(self.bodies)]
-        return float(max([0.0, *depths, *(_depth(corners[owner], *sides[target]) for owner, target in pairs)]))
+        return float(max((_depth(corners[owner], *sides[target]) for owner, target in pairs), default=0.0))
 
     # -- mechanics -----------------------------------------------------------------------------------------------------
 
@@ -467,14 +459,8 @@ class Contact:
         bodies, contacts = len(self.bodies), self.contacts
         assert contacts is not None  # solved
         forces = self.forces[:, None] * contacts.normals + self.drag
-        outer = (contacts.owners < bodies) & ((contacts.targets < 0) | (contacts.targets >= bodies))
-        inner = (contacts.owners >= bodies) & (contacts.targets >= 0)
+        outer, inner = contacts.targets >= bodies, contacts.owners >= bodies
         return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
-
-
-def _contacts(owner: int, target: int, corners: np.ndarray, *others: np.ndarray) -> Contacts:
-    """Contacts of the corners of one body with another one."""
-    return Contacts(np.full(len(corners), owner), corners, np.full(len(corners), target), *others)
 
 
 def _near(others: np.ndarray, places: np.ndarray, reach: np.ndarray | float) -> np.ndarray:
