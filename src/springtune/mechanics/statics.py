@@ -9,7 +9,6 @@ Pade approximants continue it past its poles; the nearest is the buckling load, 
 """
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -63,6 +62,7 @@ class Expansion:
 
     `load` (unknowns,) is the pattern [1]; `s` [m] and `displacements` (None at rest) are the point. Displacements are
     ``sum_n coefficients[n] sigma^n``, shape (order + 1, n_points, 2), and loads ``sum_n loads[n] sigma^n`` [m].
+    `known` is a shorter series about the same point, whose orders are taken over.
     """
 
     def __init__(
@@ -75,37 +75,28 @@ class Expansion:
         order: int = SERIES_ORDER,
         turning: bool = False,
         rough: bool = False,
+        known: "Expansion | None" = None,
     ) -> None:
-        self.s, self.order, self.turning = s, 0, turning
-        self._network, self._load = network, load
-        self._solve = factor.step if rough else factor.solve
-        self.coefficients = np.zeros((1, *network.held.shape))
+        self.s, self.order, self.turning = s, order, turning
+        solve = factor.step if rough else factor.solve
+        self.coefficients = coefficients = np.zeros((order + 1, *network.held.shape))
         if displacements is not None:
-            self.coefficients[0] = displacements
-        self.loads = np.array([s, 1.0])
-        # Component by component, shape (order + 1, 2, n_springs): sums over orders are then of whole rows.
-        self._d = (network.rest_vectors + network.end_differences(self.coefficients[0])).T[None].copy()
-        self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
-        self._inverse = 1.0 / self._length
-        self._first = np.zeros(0)
-        self._extend(order)
-        if rough:  # only a start: it is not extended, and these take 32 bytes a spring and order
-            del self._d, self._length, self._inverse
-
-    def extended(self, order: int) -> "Expansion":
-        """Return the series up to a higher order; this one does not change."""
-        longer = copy(self)
-        longer._extend(order)
-        return longer
-
-    def _extend(self, order: int) -> None:
-        network = self._network
-        series = self._d, self._length, self._inverse, self.coefficients, self.loads
-        grown = [np.concatenate([one, np.zeros((order + 1 - len(one), *one.shape[1:]))]) for one in series]
-        d, length, inverse, coefficients, loads = grown
+            coefficients[0] = displacements
+        self.loads = np.array([s, 1.0, *np.zeros(order - 1)])
+        self._denominators: dict[int, np.ndarray] = {}
+        # Component by component: sums over orders are then of whole rows.
+        d = np.zeros((order + 1, 2, len(network.rest_lengths)))
+        length, inverse = np.zeros((2, order + 1, d.shape[2]))
+        d[0] = (network.rest_vectors + network.end_differences(coefficients[0])).T
+        length[0] = np.sqrt(np.einsum("ji,ji->i", d[0], d[0]))
+        inverse[0] = 1.0 / length[0]
+        self._of_springs = () if rough else (d, length, inverse)  # only a start: these take 32 bytes a spring and order
+        if known is not None:
+            for longer, one in zip((coefficients, d, length, inverse), (known.coefficients, *known._of_springs)):
+                longer[: len(one)] = one
         weight = network.stiffness * network.rest_lengths
-        for n in range(self.order + 1, order + 1):
-            right = self._load
+        for n in range(1 if known is None else known.order + 1, order + 1):
+            right = load
             if n > 1:
                 # What lower orders give of order n, as if d[n] were 0.
                 square = np.einsum("nji,nji->i", d[1:n], d[n - 1 : 0 : -1])
@@ -114,22 +105,16 @@ class Expansion:
                 inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
                 known = np.einsum("ni,nji->ji", inverse[1 : n + 1], d[n - 1 :: -1])
                 right = -network.gather((weight * known).T)
-            change = self._solve(right)
-            if n == 1:
-                self._first = change
-            elif self.turning:
-                loads[n] = -(change @ self._first) / (self._first @ self._first)
-                change += loads[n] * self._first
+            change = solve(right)
+            if turning and n > 1:
+                first = network.reduce(coefficients[1])
+                self.loads[n] = -(change @ first) / (first @ first)
+                change += self.loads[n] * first
             coefficients[n] = network.expand(change)
             d[n] = network.end_differences(coefficients[n]).T
             along = np.einsum("ji,ji->i", d[0], d[n]) * inverse[0]
             length[n] += along
             inverse[n] -= inverse[0] ** 2 * along
-        self._d, self._length, self._inverse, self.coefficients, self.order = d, length, inverse, coefficients, order
-        self.loads = loads
-        for name in ("_products", "_radius"):
-            self.__dict__.pop(name, None)
-        self._denominators: dict[int, np.ndarray] = {}
 
     def predict(self, s: float) -> np.ndarray:
         """Displacements at ``s`` [m], shape (n_points, 2), from the series cut off before its smallest term."""
@@ -266,7 +251,7 @@ class StaticProblem(LoadedNetwork):
     @cached_property
     def long_rest(self) -> Expansion:
         """Series about rest of higher order."""
-        return self.rest.extended(HIGH_ORDER)
+        return Expansion(self.network, self.load, 0.0, None, self.network.rest_factor, HIGH_ORDER, known=self.rest)
 
     def linear(self, s: float) -> Equilibrium:
         """Return the equilibrium with linear kinematics."""
