@@ -230,4 +230,4 @@ def test_what_snaps_has_a_limit_point_and_no_buckling_load():
     crown[19, 1] = 1.0
     problem = StaticProblem(Network(mesh, clamped, np.ones(len(mesh.edges))), crown)
     assert problem.judge(-1.0, problem.nonlinear(-1.0))[0] is st.Status.UNSTABLE
-    assert np.isnan(buckling(problem, -1e-2).load)
+    assert np.isnan(buckling(problem, -1e-2)[0])

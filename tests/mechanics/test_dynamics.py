@@ -437,7 +437,7 @@ def column(share, sideways=0.0, linear=False):
     network = Network(mesh, held_directions(mesh, AXIAL), springs.relative)
     euler = np.pi**2 * STEEL.young_modulus * THICKNESS * 0.01**3 / 12 / (4 * 0.1**2)
     along, across = weights(mesh, AXIAL), weights(mesh, BENDING)
-    critical = buckling(StaticProblem(network, along), -euler / springs.reference).load
+    critical = buckling(StaticProblem(network, along), -euler / springs.reference)[0]
     load = share * critical * (along + sideways * across)
     return Motion(network, masses(mesh, DENSITY, THICKNESS) / springs.reference, load, linear=linear)
 

@@ -197,15 +197,8 @@ def follow(
     return Path(loads, moved, pivots, message)
 
 
-class Buckling(NamedTuple):
-    """Buckling load over the reference stiffness [m], and a message if it is no bifurcation."""
-
-    load: float
-    message: str
-
-
-def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
-    """Find the load at which the path from rest bifurcates, or would bifurcate if it did not bend before.
+def buckling(problem: LoadedNetwork, guess: float) -> tuple[float, str]:
+    """Find the load [m] at which the path from rest bifurcates, or would if it did not bend before; else say why not.
 
     Linear buckling analysis about two equilibria shortly below the critical load; the tangent must have a negative
     pivot shortly beyond it and none below. A column on an unsymmetric mesh bends from the first load on and stays
@@ -218,16 +211,16 @@ def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
         there, back = step * problem.slope, -step * problem.slope
         at_rest = smallest_share(network, None, there, back) * step
         if not abs(at_rest) < 100 * abs(guess):
-            return Buckling(np.nan, "no buckling load up to a hundred times the load")
+            return np.nan, "no buckling load up to a hundred times the load"
     first, second = (problem.newton(share * at_rest, share * at_rest * problem.slope) for share in (0.85, 0.95))
     if first.converged and second.converged:
         critical = (0.85 + 0.1 * smallest_share(network, first.displacements, second.displacements)) * at_rest
         if _bifurcates(problem, 0.85 * at_rest, first.displacements, critical):
-            return Buckling(critical, "")
+            return critical, ""
     low = problem.newton(0.4 * at_rest, 0.4 * at_rest * problem.slope)
     if low.converged and abs(0.4 * smallest_share(network, None, low.displacements) - 1) <= STRAIGHT_COLUMN_CHANGE:
-        return Buckling(at_rest, BENDING_MESSAGE)
-    return Buckling(np.nan, "no buckling load: the path bends far below it")
+        return at_rest, BENDING_MESSAGE
+    return np.nan, "no buckling load: the path bends far below it"
 
 
 def _bifurcates(problem: LoadedNetwork, load: float, displacements: np.ndarray, critical: float) -> bool:

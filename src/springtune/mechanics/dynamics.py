@@ -50,7 +50,6 @@ class Run(Tabled):
     - `message`: What went wrong and what to do; else empty.
     - `time`: [s]
     - `residual`: Final out-of-balance force over the load [1]; without a load, over that of the start.
-    - `step_bound`: Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
     - `samples` (n, 4): Time [s], energy [J] and momentum [N s], if asked for, see `Motion.energy`.
     """
 
@@ -61,7 +60,6 @@ class Run(Tabled):
     steps: int
     time: float
     residual: float
-    step_bound: float
     samples: np.ndarray
 
     def _rows(self) -> Iterator[tuple[str, str]]:
@@ -233,7 +231,7 @@ class Motion(Moving):
                 stepper.advance(count)
                 done += count
         sampled = np.array(samples).reshape(-1, 4)
-        return Run(u, v, *end, done, done * step, self.residual(u, first), self.step_bound(name), sampled)
+        return Run(u, v, *end, done, done * step, self.residual(u, first), sampled)
 
     def _bad_end(
         self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int

@@ -165,9 +165,8 @@ class Network:
         """Return the size of the rounding errors in internal forces [m], (unknowns,): only sums at particles round."""
         total = np.zeros(self.held.shape)
         if linear:
-            normals = self.rest_vectors / self.rest_lengths[:, None]
             apart = self.end_differences(displacements)
-            sizes = np.abs((self.stiffness * np.einsum("ij,ij->i", normals, apart))[:, None] * normals)
+            sizes = np.abs(self._linear_end_forces(apart))
             if self.energies:
                 sizes = sizes + np.einsum("abn,bn->na", np.abs(self._rest_couplings), np.abs(apart.T))
         else:
@@ -177,12 +176,15 @@ class Network:
         total += self._pattern.sum_springs(sizes, -sizes)
         return np.finfo(float).eps * self.reduce(total)
 
+    def _linear_end_forces(self, apart: np.ndarray) -> np.ndarray:
+        """Return `_end_forces` in linear kinematics, from the differences of the ends' displacements."""
+        normals = self.rest_vectors / self.rest_lengths[:, None]
+        return (self.stiffness * np.einsum("ij,ij->i", normals, apart))[:, None] * normals
+
     def linear_forces_over_k(self, displacements: np.ndarray) -> np.ndarray:
         """Forces of a linear network against displacements, with held directions [m], shape (n_points, 2)."""
-        normals = self.rest_vectors / self.rest_lengths[:, None]
         apart = self.end_differences(displacements)
-        pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
-        resistance = -self._pattern.sum_springs(pull[:, None] * normals)
+        resistance = -self._pattern.sum_springs(self._linear_end_forces(apart))
         if self.energies:
             at_first = np.einsum("abn,nb->na", self._rest_couplings, apart)
             at_second = np.einsum("ban,nb->na", self._rest_couplings, apart)

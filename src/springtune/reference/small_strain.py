@@ -54,10 +54,6 @@ DIAGONAL_SHIFT = 1e-15
 #: Approximate number of points of the returned field.
 FIELD_POINTS = 3000
 
-#: Signs, places and matrices that take coefficients to displacements on a grid, see `_Grid.values`.
-_Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
-
-
 SLENDER_REASON = "such slender shapes are for beam theory"
 
 
@@ -182,17 +178,14 @@ class UnitLevel:
 
     def displacements(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return displacements on a grid, shape (n_x, n_y, 2); x from 0 to the length, y from -1 to 1 [1]."""
-        return self._sum(self._grid.values(x, y))
+        signs, places, at_x, at_y = self._grid.values(x, y)
+        parts = ((at_x @ part @ at_y.T)[places] for part in self._coefficients)
+        return np.stack([sign * part for sign, part in zip(signs, parts)], axis=2)
 
     def field(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return x from 0 to the length, y from -1 to 1, and displacements (n_x, n_y, 2) on the output grid [1]."""
         x, y = self._grid.plot_points
-        return x, y, self._sum(self._grid.plot_values)
-
-    def _sum(self, values: _Values) -> np.ndarray:
-        signs, places, at_x, at_y = values
-        parts = ((at_x @ part @ at_y.T)[places] for part in self._coefficients)
-        return np.stack([sign * part for sign, part in zip(signs, parts)], axis=2)
+        return x, y, self.displacements(x, y)
 
 
 @lru_cache(maxsize=2 * LAST_LEVEL)  # grids are shared by references that differ in Poisson's ratio alone
@@ -309,7 +302,7 @@ class _Grid:
             field[np.ix_(*ends)] = part.reshape(len(ends[0]), -1)
         return fields
 
-    def values(self, x: np.ndarray, y: np.ndarray) -> _Values:
+    def values(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]:
         """Return signs of the displacements on a grid, places of its points in the half, and matrices along x and y."""
         signs = np.ones((2, len(x), len(y)))
         odd = 1 - self._kind.axis
@@ -328,10 +321,6 @@ class _Grid:
         spacing = (2 * self._length / FIELD_POINTS) ** 0.5
         x, half = _plot_points(self._length / 2, spacing), 1 - _plot_points(1.0, spacing)[::-1]
         return np.concatenate([x, self._length - x[-2::-1]]), np.concatenate([-half[:0:-1], half])
-
-    @cached_property
-    def plot_values(self) -> _Values:
-        return self.values(*self.plot_points)
 
 
 class _Line:
