@@ -141,7 +141,6 @@ class MeshCache:
         self.filled: set[Beam] = set()
         self.references: dict[tuple[object, ...], Any] = {}
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
-        self._typical: tuple[np.ndarray, dict[str, float]] | None = None
         self._patterns: dict[bytes, Network] = dict(like._patterns) if like and share_edges(mesh, like.mesh) else {}
         self._networks: dict[bytes, KnownNetwork] = {}
 
@@ -178,16 +177,6 @@ class MeshCache:
                 springs = definition.springs(self.mesh, first, self.thickness, given)
             self._derived = key, springs, time.perf_counter() - begin
         return self._derived[1:]
-
-    def typical_stiffness(self, springs: Springs) -> dict[str, float]:
-        """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
-        sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
-        if self._typical is None or self._typical[0] is not sizes:
-            around = self.mesh.on_outline
-            found = {"inside": np.nan if around.all() else np.median(sizes[~around])}
-            found |= {"outline": np.median(sizes[around]), "least": sizes.min(), "most": sizes.max()}
-            self._typical = sizes, found
-        return {name: float(springs.reference * value) for name, value in self._typical[1].items()}
 
     def network(self, directions: np.ndarray, springs: Springs) -> Network:
         """Network of springs that is held in some `directions`, shape (n_points, 2)."""

@@ -87,7 +87,7 @@ def _solve_problem(problem, springs, seconds, task):
     found = problem.solve(springs)
     result = {"seconds": time.perf_counter() - begin, "definition_seconds": seconds}
     result |= {name: getattr(found, name) for name in ("status", "message", "negative_pivots")}
-    result |= {f"stiffness_{part}": value for part, value in problem.cache.typical_stiffness(springs).items()}
+    result |= _typical_stiffness(problem.mesh, springs)
     result["further_energies"] = len(springs.energies)
     if task.get("keep_fields") and found.equilibrium.converged:
         moved = found.equilibrium.displacements
@@ -95,6 +95,14 @@ def _solve_problem(problem, springs, seconds, task):
         result |= {"displacements": moved, "spring_stiffnesses": springs.reference * springs.relative}
         result["spring_forces"] = springs.reference * forces
     return found, result
+
+
+def _typical_stiffness(mesh, springs):
+    """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
+    sizes, around = springs.relative if springs.linear_springs is None else springs.linear_springs, mesh.on_outline
+    found = {"inside": np.nan if around.all() else np.median(sizes[~around]), "outline": np.median(sizes[around])}
+    found |= {"least": sizes.min(), "most": sizes.max()}
+    return {f"stiffness_{part}": float(springs.reference * value) for part, value in found.items()}
 
 
 def solve_beam(beam, cache, field, task):
