@@ -57,30 +57,25 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
     path = dataset_file(path)
     with ExitStack() as stack:
-        with refuse_damaged_file(path), bounded(OPENING_BYTES):
-            check_alone(path)
-            file = stack.enter_context(h5netcdf.File(path, decode_vlen_strings=True))
-            attributes = dict(file.attrs)
-        if "springtune_version" not in attributes:
+        try:
+            with bounded(OPENING_BYTES):
+                check_alone(path)
+                file = stack.enter_context(h5netcdf.File(path, decode_vlen_strings=True))
+                attributes = dict(file.attrs)
+                name = attributes.get("study", "unknown")
+                named = isinstance(name, str) and NAME.fullmatch(name) is not None  # it becomes part of paths
+                ours = "springtune_version" in attributes
+                found = tree(file) if ours and named else None
+        except DataElsewhere:
+            raise
+        except Exception as error:  # of any library, on a damaged file
+            raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
+        if not ours:
             raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
-        name = attributes.get("study", "unknown")
-        if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
+        if found is None:
             raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
-        with refuse_damaged_file(path), bounded(OPENING_BYTES):
-            found = tree(file)
         found.set_close(stack.pop_all().close)
     return found
-
-
-@contextmanager
-def refuse_damaged_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Context that turns any error of the libraries on a damaged file into a refusal."""
-    try:
-        yield
-    except DataElsewhere:
-        raise
-    except Exception as error:
-        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
 
 
 def dataset_file(path: str | os.PathLike[str]) -> Path:
