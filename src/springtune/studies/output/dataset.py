@@ -4,7 +4,7 @@ import math
 import os
 import shutil
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -105,42 +105,12 @@ class Group:
                 array[(*place, *map(slice, np.shape(value)))] = value
         return data
 
-    def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
-        """Copy with further dimensions."""
-        variables = {}
-        for name, (dimensions, units, long_name, nothing) in self.variables.items():
-            shared = [one for one in dimensions if one in DIMENSIONS]
-            own = [one for one in dimensions if one not in DIMENSIONS]
-            if name not in without:
-                variables[name] = (*shared, *further.get(name, ()), *own), units, long_name, nothing
-        return replace(self, variables=variables)
-
 
 MESH_DIMENSIONS = ("beam", "mesh_type", "mesh_size")
 
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 NO_NODE = EMPTY_VALUES["no node"]  # fill value of UGRID connectivities
-
-UGRID: dict[str, dict[str, object]] = {
-    "mesh": {
-        "cf_role": "mesh_topology",
-        "topology_dimension": np.int32(2),
-        "node_coordinates": "x y",
-        "edge_node_connectivity": "spring_nodes",
-        "face_node_connectivity": "cell_nodes",
-        "node_dimension": "particle",
-        "edge_dimension": "spring",
-        "face_dimension": "cell",
-    },
-    "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
-    "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
-}
-"""Attributes of unstructured meshes by UGRID-1.0, see `Group.further`."""
-
-PARTICLE_ATTRIBUTES: dict[str, object] = {"mesh": "mesh", "location": "node"}
-SPRING_ATTRIBUTES: dict[str, object] = {"mesh": "mesh", "location": "edge"}
-"""Attributes of variables of particles or springs."""
 
 CHUNK_BYTES = 2**18  # most bytes of a compressed chunk, which is read for each of its cells
 

@@ -18,7 +18,8 @@ from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
 from ...config.model import Reference, Study, declared
-from ...output.dataset import NO_NODE, PARTICLE_ATTRIBUTES, SHOWN_PREFIX, SPRING_ATTRIBUTES, UGRID, Group
+from ...output import dataset
+from ...output.dataset import NO_NODE, SHOWN_PREFIX, Group
 from ...runs import store
 from . import any_reference, stored
 from . import kind as bodies
@@ -40,9 +41,24 @@ def _group(group: str, **further: Any) -> Group:
     return Group(group, **declared(__file__, group, **DIMENSIONS), flags={"applies": ("no", "yes")}, further=further)
 
 
-MESH_ATTRIBUTES = UGRID | dict.fromkeys(("spring_force", "stiffness"), SPRING_ATTRIBUTES)
-MESH_ATTRIBUTES |= {f"displacement_{axis}": PARTICLE_ATTRIBUTES for axis in "xy"}
-MESH_ATTRIBUTES |= {f"particle_reference_{axis}": PARTICLE_ATTRIBUTES for axis in "xy"}
+MESH_ATTRIBUTES = {
+    "mesh": {
+        "cf_role": "mesh_topology",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "x y",
+        "edge_node_connectivity": "spring_nodes",
+        "face_node_connectivity": "cell_nodes",
+        "node_dimension": "particle",
+        "edge_dimension": "spring",
+        "face_dimension": "cell",
+    },
+    "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
+    "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+}
+MESH_ATTRIBUTES |= dict.fromkeys(("spring_force", "stiffness"), {"mesh": "mesh", "location": "edge"})
+PARTICLE_VARIABLES = [f"{name}_{axis}" for name in ("displacement", "particle_reference") for axis in "xy"]
+MESH_ATTRIBUTES |= dict.fromkeys(PARTICLE_VARIABLES, {"mesh": "mesh", "location": "node"})
+"""Attributes of unstructured meshes by UGRID-1.0, and of variables of springs and particles."""
 
 ROOT, SENSITIVITY = _group("/"), _group("/sensitivity")
 FINITE_STRAIN, BLOCK = _group("/finite_strain"), _group("/block")
@@ -67,17 +83,23 @@ PRINTED_PREFIX = "paper_"  # prefix of variables of printed cells, which have no
 
 def swept(group: Group, study: Study) -> Group:
     """Return a group whose variables have further dimensions: the swept parameters that they depend on."""
-    further: dict[str, list[str]] = {}
-    for name, (dimensions, *_) in group.variables.items():
+    variables = {}
+    for name, (dimensions, units, long_name, nothing) in group.variables.items():
         if name in BODY_NAMES.values():
-            further[name] = [one for one in study.swept if BODY_NAMES.get(one) == name]
+            further = [one for one in study.swept if BODY_NAMES.get(one) == name]
         elif "load" in dimensions and not name.startswith(PRINTED_PREFIX):
-            further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
-    found = group.over(further, without={"force"} & {*study.swept} if group is ROOT else ())
+            further = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
+        else:
+            further = []
+        shared = [one for one in dimensions if one in dataset.DIMENSIONS]
+        own = [one for one in dimensions if one not in dataset.DIMENSIONS]
+        variables[name] = (*shared, *further, *own), units, long_name, nothing
+    if group is ROOT and "force" in study.swept:
+        del variables["force"]  # a dimension
     if group in (ROOT, FINITE_STRAIN, BLOCK) and study.plane_strain:
-        row = ("material",), "1", "plane of the material, 'stress' or 'strain'; its constants are those in 3-D", ""
-        found = replace(found, variables=found.variables | {"material_plane": row})
-    return found
+        words = "plane of the material, 'stress' or 'strain'; its constants are those in 3-D"
+        variables["material_plane"] = ("material",), "1", words, ""
+    return replace(group, variables=variables)
 
 
 def fields_of(study: Study) -> Group:
