@@ -215,8 +215,6 @@ _FIRST_KINDS = ("bodies", "moduli", "laying", "stability", "benchmark", "samples
 KINDS = _FIRST_KINDS + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST_KINDS}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
 
-VIEWS = "views.yaml"  # file of a study kind with its views on the page to browse
-
 FORMATS = ("png", "pdf")  # endings of a figure's files
 
 Variables = dict[str, tuple[tuple[str, ...], str, str, Any]]
@@ -322,9 +320,9 @@ def stem(name: str, selection: Mapping[str, str]) -> str:
     return "_".join([name, *selection.values()])
 
 
-def kind_files(name: str) -> list[Path]:
-    """Files of a name in the packages of the study kinds."""
-    return [path for kind in KINDS if (path := _PACKAGES / kind / name).is_file()]
+def view_files() -> list[Path]:
+    """Files with the views of the study kinds on the page to browse."""
+    return [path for kind in KINDS if (path := _PACKAGES / kind / "views.yaml").is_file()]
 
 
 def modules(*names: str) -> list[str]:

@@ -29,7 +29,7 @@ from springtune.problem.compare import error_text
 from springtune.problem.quantities import Status
 from springtune.safe_io import write_json, write_text
 
-from ..config.model import VIEWS, kind_files
+from ..config.model import view_files
 from . import reading
 from .answers import ERROR_COLOURS, ERROR_RANGE, DefinitionErrors, definition_errors, status_words, what_to_type
 from .dataset import against_own_laws, columns, flag_words, requested_cells, sign_of_errors
@@ -76,7 +76,7 @@ class View:
 def views() -> dict[str, View]:
     """Views that the study kinds declare, by group."""
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the first takes a sixth of the time, where it was built
-    declared = [one for path in kind_files(VIEWS) for one in yaml.load(path.read_text(encoding="utf-8"), loader)]
+    declared = [one for path in view_files() for one in yaml.load(path.read_text(encoding="utf-8"), loader)]
     return {one["group"]: View(**one | {"plots": tuple(Plot(**plot) for plot in one["plots"])}) for one in declared}
 
 
@@ -84,7 +84,10 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
     with reading.open(dataset) as tree, reading.guard(dataset):
         groups, found = packed(tree), overview(tree)
-    attributes, library = groups[0]["attributes"], _library()
+    attributes = groups[0]["attributes"]
+    # Importing Bokeh would take longer than making the page.
+    scripts = Path(cast(Any, find_spec("bokeh")).origin).parent / "server/static/js"
+    library = {name: (scripts / f"{name}.min.js").read_text(encoding="utf-8") for name in BOKEH_SCRIPTS}
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
     content = {"groups": groups, "declared": {path: asdict(view) for path, view in views().items()}, "scale": scale}
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
@@ -114,12 +117,6 @@ def _asset(name: str) -> str:
 
 def _compress(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content, 9)).decode()
-
-
-def _library() -> dict[str, str]:
-    """Read the scripts of BokehJS; importing Bokeh would take longer than making the page."""
-    folder = Path(cast(Any, find_spec("bokeh")).origin).parent / "server/static/js"
-    return {name: (folder / f"{name}.min.js").read_text(encoding="utf-8") for name in BOKEH_SCRIPTS}
 
 
 # -- packed numbers ----------------------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import h5netcdf
@@ -319,9 +318,7 @@ def requested_cells(data: xr.Dataset, error: str = "deformation_error") -> pd.Da
 Scaled = Mapping[str, tuple[str, float]]  # variable and factor by the column of a table
 
 
-def table_rows(
-    data: xr.Dataset, present: xr.DataArray, names: Collection[str], scaled: Scaled = MappingProxyType({})
-) -> list[dict[str, Any]]:
+def table_rows(data: xr.Dataset, present: xr.DataArray, names: Collection[str], scaled: Scaled) -> list[dict[str, Any]]:
     """Rows of the present cells: labels and variables by name, and variables by column times a factor."""
     variables = [name for name in (*names, *(name for name, _ in scaled.values())) if name in data.variables]
     return [

@@ -14,7 +14,7 @@ from typing import Any
 
 from springtune.safe_io import write_bytes
 
-from ..config.model import FORMATS, VIEWS, Output, Stage, Study, kind_files, kinds, modules, outputs
+from ..config.model import FORMATS, Output, Stage, Study, kinds, modules, outputs, view_files
 from . import attempts, store
 from .keys import inputs, read_digests, stage_key
 from .source import PACKAGE, RECORDS, TASKS, checksum, hash_of, read_note
@@ -228,7 +228,7 @@ def _present_digest(study: Study, members: Iterable[Output], files: list[str]) -
 
 
 def _browse_digest(study: Study) -> str:
-    files = [*sorted((PACKAGE / "studies/output/assets").iterdir()), *kind_files(VIEWS)]
+    files = [*sorted((PACKAGE / "studies/output/assets").iterdir()), *view_files()]
     assets = [(path.name, checksum(path)) for path in files]
     return hash_of(linked_files(study), stage_key("studies.output.browse"), assets)
 
