@@ -86,7 +86,7 @@ class EngineResult(Tabled, Ended):
         ``"rest"``; else, and why: ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the
         last frame; ``"inverted"``: it rests with cells turned inside out; or ``"diverged"``.
     frames, frame_seconds : int, float
-        Time that a frame took, without the first one, which may compile [s]; NaN of a single frame.
+        Time that a frame took, without the first ones, which may compile [s]; NaN of a single frame.
     swing : float
         Largest amplitude about the mean, where it swings [m].
     scene, engine, setting, factor, damping
@@ -309,22 +309,19 @@ def drift(scene: Scene, displacements: np.ndarray) -> float:
 def reordered(net: SpringNet, order: int) -> tuple[SpringNet, np.ndarray]:
     """Net of the same mesh with its particles and cells in another order, and the new place of each particle."""
     random = np.random.default_rng(order)
-    rows = {
-        name: (random.permutation(count) if order > 1 else np.arange(count)[:: -1 if order else 1])
-        for name in ("points", "triangles", "quads")
-        for count in [len(getattr(net, name))]
-    }
-    points, places = rows["points"], np.argsort(rows["points"])
+    counts = len(net.points), len(net.triangles), len(net.quads)
+    points, *rows = (random.permutation(count) if order > 1 else np.arange(count)[::-1] for count in counts)
+    cells, places = {3: rows[0], 4: rows[1]}, np.argsort(points)
     springs = np.sort(places[net.springs], axis=1)
     edges = np.lexsort(springs.T[::-1])
     arrays = {name: getattr(net, name)[points] for name in ("points", "masses", "held", "forces")}
     arrays |= {name: getattr(net, name)[edges] for name in ("rest_lengths", "stiffness")}
-    arrays |= {name: places[getattr(net, name)[rows[name]]] for name in ("triangles", "quads")}
+    arrays |= {"triangles": places[net.triangles[cells[3]]], "quads": places[net.quads[cells[4]]]}
     energies = []
     for one in net.energies:
-        cells = rows["triangles" if one.cells.shape[1] == 3 else "quads"]
-        values = {name: values[cells] for name, values in one.values.items()}
-        energies.append(replace(one, cells=places[one.cells[cells]], values=values))
+        own = cells[one.cells.shape[1]]
+        values = {name: values[own] for name, values in one.values.items()}
+        energies.append(replace(one, cells=places[one.cells[own]], values=values))
     return replace(net, **arrays, springs=springs[edges], energies=tuple(energies)), places
 
 
@@ -339,10 +336,11 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
     """Advance a session until it rests: the way left, extrapolated from the last changes, is below `tolerance`."""
-    seen, seconds = list[np.ndarray](), list[float]()  # of frames; seconds without the first one, which may compile
+    seen, seconds = list[np.ndarray](), list[float]()
 
     def ended(displacements: np.ndarray, status: str, message: str, swing: float) -> Ended:
-        return Ended(displacements, status, message, done, float(np.median(seconds)) if seconds else np.nan, swing)
+        frame_seconds = float(np.median(seconds[1:])) if len(seconds) > 1 else np.nan  # the first ones may compile
+        return Ended(displacements, status, message, done, frame_seconds, swing)
 
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
@@ -350,13 +348,9 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
         each = ceil(size_of_window / LOOKS_PER_WINDOW)
         for begun in range(0, size_of_window, each):
             count = min(each, size_of_window - begun)
-            timed = count if done else count - 1
-            if not done:
-                session.advance(1)
-            if timed:
-                begin = time.perf_counter()
-                session.advance(timed)
-                seconds.append((time.perf_counter() - begin) / timed)
+            begin = time.perf_counter()
+            session.advance(count)
+            seconds.append((time.perf_counter() - begin) / count)
             done, now = done + count, session.displacements()
             size = float(np.abs(now).max())
             if not size <= DIVERGED_EXTENTS * extent:
