@@ -313,8 +313,6 @@ class _Groups:
         starts = content.starts()
         mask = np.zeros(starts[-1], dtype=bool)
         chosen = np.concatenate([[], *content.cell_groups.get(name, [])]).astype(np.int64)
-        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < len(mask):
-            raise MeshError("has cells that are not in the file; remove these")
         mask[chosen] = True
         blocks = [(CORNER_COUNTS[kind], cells) for kind, cells in content.cells]
         cells = [(count, cells, own) for (count, cells), own in zip(blocks, np.split(mask, starts[1:-1]))]

@@ -20,14 +20,12 @@ def near_edges(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.n
     low, high = along.min(axis=0) - reach[:, None], along.max(axis=0) + reach[:, None]
     order = np.argsort(low[:, 0], kind="stable")
     counts = np.searchsorted(low[order, 0], high[order, 0], side="right") - np.arange(len(order)) - 1
-    before = np.concatenate([[0], np.cumsum(counts)])
+    before = np.cumsum(counts) - counts
+    parts = np.searchsorted(before, np.arange(MOST_PAIRS, counts.sum(), MOST_PAIRS))
     found = []
-    begin = 0
-    while begin < len(order):
-        stop = max(begin + 1, int(np.searchsorted(before, before[begin] + MOST_PAIRS, side="right")) - 1)
-        here = counts[begin:stop]
-        first = np.repeat(np.arange(begin, stop), here)
-        second = first + 1 + np.arange(len(first)) - np.repeat(before[begin:stop] - before[begin], here)
+    for here in np.split(np.arange(len(order)), parts):
+        first = np.repeat(here, counts[here])
+        second = first + 1 + np.arange(len(first)) - np.repeat(before[here] - before[here[:1]], counts[here])
         one, other = order[first], order[second]
         near = (low[one, 1] <= high[other, 1]) & (low[other, 1] <= high[one, 1])
         near &= (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2))
@@ -37,7 +35,6 @@ def near_edges(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> np.n
         distance = np.min([distances(a, c, d), distances(b, c, d), distances(c, a, b), distances(d, a, b)], axis=0)
         close = crossing | (distance <= reach[one] + reach[other])
         found.append(np.stack([one, other], axis=1)[close])
-        begin = stop
     return np.concatenate(found)
 
 
