@@ -10,8 +10,6 @@ from ..mesh.sides import in_words
 from .loads import MIDDLE, LoadKind
 from .shapes import LoadCase, Quantity, check_names
 
-FACE_POSITIONS = np.linspace(0.0, 1.0, 101)  # places of the profile of a pressed face, over its length [1]
-
 POINT_TOLERANCE = 1e-9  # distance from a particle below which a point is that particle, over the extent of the mesh [1]
 
 OUTSIDE_TOLERANCE = 0.25  # how far outside the nearest cell a point may lie, over its size [1], as next to an arc

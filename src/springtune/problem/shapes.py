@@ -339,8 +339,7 @@ class Traction:
 
     def __post_init__(self) -> None:
         _check_name(self.group, "group of a traction")
-        force = _vector(self.force, "force", f"traction on {self.group!r}, force", "('4 kN', 0)")
-        put(self, force=force)
+        put(self, force=_vector(self.force, "force", f"traction on {self.group!r}, force", "('4 kN', 0)"))
 
 
 @dataclass(frozen=True)
@@ -692,8 +691,7 @@ class Shape:
             raise ValueError(f"point {name!r}: {in_words(point)} is not in the body; move it")
         for other, place in self.points.items():
             if 0 < math.dist(point, place) <= near:
-                both = f"points {name!r} and {other!r}"
-                raise ValueError(f"{both}: coincide at {in_words(point)}; make them one")
+                raise ValueError(f"points {name!r} and {other!r}: coincide at {in_words(point)}; make them one")
         return point
 
     @cached_property

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
@@ -25,7 +24,7 @@ from . import any_reference, stored
 from . import kind as bodies
 from .kind import keeps_fields
 from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, has_pressure
-from .stored import FIELD_ARRAYS, fields_key, stored_key
+from .stored import FACE_POSITIONS, FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
 
 CELL = ("beam", "mesh_type", "mesh_size", "material", "load")

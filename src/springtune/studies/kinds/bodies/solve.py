@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from springtune.mechanics.statics import SingularError
-from springtune.problem.boundary import FACE_POSITIONS, check_case
+from springtune.problem.boundary import check_case
 from springtune.problem.loads import LOAD_KINDS, Load
 from springtune.problem.materials import material_of
 from springtune.problem.quantities import Status
@@ -21,7 +21,7 @@ from springtune.springs.base import DEFINITIONS, DefinitionError
 
 from ...runs.source import hash_of
 from . import stored
-from .stored import stored_key
+from .stored import FACE_POSITIONS, stored_key
 
 parts = stored.parts
 

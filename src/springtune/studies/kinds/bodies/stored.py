@@ -114,6 +114,8 @@ def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
+FACE_POSITIONS = np.linspace(0.0, 1.0, 101)  # places of the profile of a pressed face, over its length [1]
+
 FIELD_ARRAYS = dict.fromkeys(("displacements", "reference_displacements"), "f8")
 FIELD_ARRAYS |= dict.fromkeys(("spring_stiffnesses", "spring_forces"), "f4")
 """Types of stored arrays of particles and springs."""
