@@ -355,7 +355,7 @@ threaded = cache(partial(beam, mesh_type="free", size=6e-4))
 @pytest.mark.parametrize("linear", [False, True])
 def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, precision):
     motion = with_(threaded(), linear=linear, mass_damping=20.0)
-    step = 0.5 * motion.step_bound("symplectic-euler")
+    step = 1 / motion.particle_bound
     assert len(motion.network.mesh.edges) >= 3 * stepping.LEAST_ENTRIES_A_THREAD
     if damped:
         motion = with_(motion, dampers=0.05 * step * motion.network.stiffness)
@@ -374,7 +374,7 @@ def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, prec
 def test_steps_that_follow_each_other_along_a_network_are_those_of_the_whole(linear, damped):
     """Blocks that are some steps ahead of others take the steps that one pass over all particles a step takes."""
     motion = beam(mesh_type="alternating", size=7e-4, linear=linear, mass_damping=20.0)
-    step, steps, network = 0.5 * motion.step_bound("symplectic-euler"), 45, motion.network
+    step, steps, network = 1 / motion.particle_bound, 45, motion.network
     if damped:
         motion = with_(motion, dampers=0.05 * step * network.stiffness)
     inverse = np.where(network.held, 0.0, 1 / motion.inertia)

@@ -76,12 +76,8 @@ class Motion(Moving):
 
     @cached_property
     def particle_bound(self) -> float:
-        """Return an upper bound of the highest frequency [rad/s], ``omega^2 <= max_i 2 sum_j k_ij / m_i``."""
+        """Upper bound of the highest frequency [rad/s], ``omega^2 <= max_i 2 sum_j k_ij / m_i``; 2 over it is safe."""
         return float(np.sqrt((self.network.reduce(self.network.local_stiffness) / self.mass).max()))
-
-    def step_bound(self, integrator: str) -> float:
-        """Step that is safe by each particle's stiffness alone, springs undamped [s]; infinite for implicit schemes."""
-        return np.inf if integrator in IMPLICIT else 2 / self.particle_bound
 
     @cached_property
     def omega_max(self) -> float:

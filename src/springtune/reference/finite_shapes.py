@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from ..mesh.sheets import GroupedMesh
 from ..problem.materials import AnyMaterial, Material
 from ..problem.shapes import LoadCase, Shape
-from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law_of, matrix_of, strain_of
+from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law_of, matrix_of, strain_of, turning_of
 from .shapes import LOWEST_DEGREE, Level, Problem, ShapeReference, solve_shape
 from .triangles import inverse_of, local_functions, side_functions, tabulated
 
@@ -166,12 +166,9 @@ class _FiniteLevel(Level, Body):
             for ends, sense in self.group_sides(pressure.group) if pressure.follower else ():
                 along, weights = np.polynomial.legendre.leggauss(space.degree + 1)
                 values, slopes = side_functions(space.degree, along)
-                scale = -pressure.pressure * sense * self.problem.shape.thickness
+                scale = pressure.pressure * sense * self.problem.shape.thickness
                 block = values.T @ (weights[:, None] * slopes) * scale
-                rows, columns = np.meshgrid(2 * space.on_side(ends), 2 * space.on_side(ends), indexing="ij")
-                for part, row, column in ((block, 0, 1), (-block, 1, 0)):
-                    places = (rows + row).ravel(), (columns + column).ravel()
-                    total = total + csr_array((part.ravel(), places), shape=(size, size))
+                total = total + turning_of(block[None], space.on_side(ends)[None], size)
         return total
 
     def _area_growth(self) -> np.ndarray:

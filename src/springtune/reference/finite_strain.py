@@ -278,7 +278,10 @@ class _Sheet(Body):
         self.load = np.zeros(places.shape)
         shapes = np.stack([np.asarray(one[0]) * side.dx for one in side.basis])
         np.add.at(self.load[:, component], side.element_dofs, shapes.sum(axis=2))
-        self.turning = _turning(side, shapes, kind.along) if follower else csr_array((places.size, places.size))
+        slopes = np.stack([one[0].grad[kind.along] for one in side.basis])
+        blocks = np.einsum("iep,jep->eij", shapes, slopes) * (1 if kind.along == 0 else -1)
+        turning = turning_of(blocks, side.element_dofs.T, places.size)
+        self.turning = turning if follower else csr_array(turning.shape)
 
     def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
         """Equilibrium under the whole load, reached in watched steps; lengths are over half the height."""
@@ -306,14 +309,14 @@ class _Sheet(Body):
         return np.concatenate([x, 2 * x[-1] - x[-2::-1]]), y, whole
 
 
-def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
-    """Derivative of a following pressure's forces by displacements: cofactor of the deformation times the normal."""
-    slopes = np.stack([one[0].grad[along] for one in side.basis])
-    blocks = np.einsum("iep,jep->ije", shapes, slopes) * (1 if along == 0 else -1)
-    rows, columns = np.broadcast_arrays(side.element_dofs[:, None], side.element_dofs[None])
-    parts = [(-blocks, 0, 1), (blocks, 1, 0)]
-    entries = [(part.ravel(), (2 * rows.ravel() + a, 2 * columns.ravel() + b)) for part, a, b in parts]
-    return sum(csr_array(entry, shape=(2 * side.N, 2 * side.N)) for entry in entries)
+def turning_of(blocks: np.ndarray, numbers: np.ndarray, size: int) -> csr_array:
+    """Derivative of a following pressure's forces by displacements: cofactor of the deformation times the normal.
+
+    `blocks` (n, m, m) are integrals of the functions `numbers` (n, m) of a side times the pressure and their slopes.
+    """
+    rows, columns = entry_places(2 * numbers)
+    parts = [(-blocks.ravel(), (rows, columns + 1)), (blocks.ravel(), (rows + 1, columns))]
+    return sum(csr_array(part, shape=(size, size)) for part in parts)
 
 
 def strain_of(gradient: np.ndarray) -> np.ndarray:

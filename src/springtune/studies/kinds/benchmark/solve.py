@@ -162,7 +162,7 @@ def explicit(scene, sizes, updates=EXPLICIT_UPDATES):
         cache = MeshCache(mesh, scene.beam.thickness)
         springs, _ = cache.derive("lattice", scene.material)
         motion = motion_of(cache, scene.kind, springs, scene.material.density, scene.force)
-        step = 0.9 * motion.step_bound("central-difference")
+        step = 0.9 * (2 / motion.particle_bound)
         steps = max(FEWEST_STEPS, round(updates / len(mesh.edges)))
         for threads, precision in product(THREAD_COUNTS, PRECISIONS):
             # The steps alone: what a run prepares once is soon less than they are.
