@@ -5,7 +5,7 @@ interpolated; coefficients and error fall geometrically (Trefethen, Approximatio
 2013, theorem 8.2). Solves between nodes decide: the largest difference, times a factor, enters the error estimate.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Self
 
@@ -77,12 +77,9 @@ class Interpolant:
         aspect_range: tuple[float, float],
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
-        solve: Callable[..., Any] | None = None,
     ) -> Self:
         """Build an interpolant over a box of aspect ratios and Poisson's ratios, with as many solves as it needs."""
-        from .small_strain import solve_unit  # here: who reads an interpolant does without scipy
-
-        box = _Box(kind, aspect_range, nu_range, tolerance, solve or solve_unit)
+        box = _Box(kind, aspect_range, nu_range, tolerance)
         values, error_estimate = box.certified()
         return cls(kind, aspect_range, nu_range, values, error_estimate, len(box.solved))
 
@@ -122,7 +119,6 @@ class _Box:
     aspect_range: tuple[float, float]
     nu_range: tuple[float, float]
     tolerance: float
-    solver: Callable[..., Any]
     #: Answers in the order of `ANSWER_NAMES`, and error estimates, by place in the box (-1 to 1 on each axis).
     solved: dict[tuple[float, float], tuple[np.ndarray, float]] = field(default_factory=dict)
 
@@ -157,7 +153,7 @@ class _Box:
 
     def _solve(self, places: list[tuple[float, float]]) -> tuple[np.ndarray, float]:
         """Return answers (n_places, 4) and their largest error estimate; each place is solved once."""
-        from .small_strain import ReferenceNotConvergedError
+        from .small_strain import ReferenceNotConvergedError, solve_unit  # here: reading one does without scipy
 
         # Elements are shared by those of one aspect ratio, which follow each other.
         for along, across in places:
@@ -165,7 +161,7 @@ class _Box:
                 aspect = float(np.exp(_value_at_place(along, np.log(self.aspect_range))))
                 nu = float(np.clip(_value_at_place(across, self.nu_range), *self.nu_range))
                 try:
-                    found = self.solver(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
+                    found = solve_unit(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
                 except ReferenceNotConvergedError as error:
                     raise self._failure(str(error)) from error
                 answers = np.array([getattr(found, name) for name in ANSWER_NAMES])
