@@ -125,54 +125,48 @@ def test_sectors_whose_triangles_once_folded(seed):
         assert mean(points, on(square, 1, 0.0), theirs[:, axis]) == pytest.approx(ours.values[name], rel=1e-4)
 
 
-def test_a_plate_with_a_hole():
-    shape, material = others.holed_plate()
-    load_case = shape.loads["pull"]
-    size, radius = 0.05, 0.01
+SIZE, RADIUS = 0.05, 0.01  # of `others.holed_plate` [m]
+
+
+def quarter_plate(columns, rows, traction):
+    """Points, elements, square and supports of a plate with a hole, the upper half of its right side, and the pull."""
 
     def place(s, t):
         """From the hole to the upper and right sides, around the corner between these."""
         angle = (1 - s) * np.pi / 2
-        ring = radius * np.stack([np.cos(angle), np.sin(angle)])
-        box = size * np.stack([np.minimum(1, 2 * s), np.minimum(1, 2 - 2 * s)])
+        ring = RADIUS * np.stack([np.cos(angle), np.sin(angle)])
+        box = SIZE * np.stack([np.minimum(1, 2 * s), np.minimum(1, 2 - 2 * s)])
         return (ring + t**1.5 * (box - ring)).T
 
-    points, elements, square = mapped(64, 48, place)
+    points, elements, square = mapped(columns, rows, place)
     held = np.zeros(points.shape, dtype=bool)
     held[on(square, 0, 1.0), 1] = held[on(square, 0, 0.0), 0] = True
     right = on(square, 1, 1.0)
     right = right[len(right) // 2 :]
-    load = pressed(points, right, lambda way: np.array([10e6 * shape.thickness * np.hypot(*way), 0.0]))
+    load = pressed(points, right, lambda way: np.array([traction * np.hypot(*way), 0.0]))
+    return points, elements, square, held, right, load
+
+
+def test_a_plate_with_a_hole():
+    shape, material = others.holed_plate()
+    points, elements, square, held, right, load = quarter_plate(64, 48, 10e6 * shape.thickness)
     theirs = displaced(shape, points, elements, material, load, held)
-    ours = solve_shape(shape, load_case, material)
+    ours = solve_shape(shape, shape.loads["pull"], material)
     assert mean(points, right, theirs[:, 0]) == pytest.approx(ours.values["end"], rel=1e-4)
     np.testing.assert_allclose(ours.at(points), theirs, rtol=0, atol=1e-4 * np.abs(theirs).max())
     # The stress at the top of the hole by the displacements along it, x = r sin of the angle from there.
     hole = on(square, 1, 0.0)
     s, moved = square[hole, 0] * np.pi / 2, theirs[hole, 0]
-    strain = odd_slope(s, moved) / radius
+    strain = odd_slope(s, moved) / RADIUS
     assert material.young_modulus * strain == pytest.approx(ours.values["top-of-the-hole"], rel=1e-3)
 
 
 def test_rubber_with_a_hole():
     """Neo-Hooke at some 30 % strain, beside the hole at 80 %."""
     shape, material = others.holed_plate()[0], st.Material(1e6, 0.4, name="rubber")
-    radius, size = 0.01, 0.05
-    force = 0.3e6 * size * shape.thickness
+    force = 0.3e6 * SIZE * shape.thickness
     case = replace(shape.loads["pull"], tractions=(st.Traction("right", (force, 0.0)),), quantities=PULLED)
-
-    def place(s, t):
-        angle = (1 - s) * np.pi / 2
-        ring = radius * np.stack([np.cos(angle), np.sin(angle)])
-        box = size * np.stack([np.minimum(1, 2 * s), np.minimum(1, 2 - 2 * s)])
-        return (ring + t**1.5 * (box - ring)).T
-
-    points, elements, square = mapped(32, 24, place)
-    held = np.zeros(points.shape, dtype=bool)
-    held[on(square, 0, 1.0), 1] = held[on(square, 0, 0.0), 0] = True
-    right = on(square, 1, 1.0)
-    right = right[len(right) // 2 :]
-    load = pressed(points, right, lambda way: np.array([force / size * np.hypot(*way), 0.0]))
+    points, elements, _, held, right, load = quarter_plate(32, 24, force / SIZE)
     theirs = calculix.solve(points, elements, "CPS8", material, shape.thickness, load, held, finite=True)
     ours = solve_finite_shape(replace(shape, loads={"pull": case}), case, {"": material})
     assert mean(points, right, theirs[:, 0]) == pytest.approx(ours.values["end"], rel=1e-3)
