@@ -10,6 +10,7 @@ from springtune.mesh.cells import MESH_TYPES, too_many
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE_REASON
 from springtune.problem.quantities import MOST_SCENES, MOST_SCENES_VARIABLE
+from springtune.safe_io import number_text
 from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
@@ -159,17 +160,12 @@ def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool
 # -- meshes ------------------------------------------------------------------------------------------------------------
 
 
-def in_mm(length: float) -> str:
-    """Return a length [m] as text in mm."""
-    return f"{1e3 * length:g} mm"
-
-
 def check_particles(problems: Problems, path: Place, sizes: Iterable[float], length: float, height: float) -> None:
     """Refuse mesh sizes that give too many particles in a box."""
     size = min(sizes)
     count = MESH_TYPES["structured"].particles(length, height, size)
     if why := too_many(count, size, min(length, height), f"box of '{path[0]}'"):
-        problems.add(path, f"{in_mm(size)} {why}")
+        problems.add(path, f"{number_text(size, 'm')} {why}")
 
 
 def check_meshes(config: StudyConfig, grids: Iterable[Grid], problems: Problems) -> None:
@@ -180,7 +176,7 @@ def check_meshes(config: StudyConfig, grids: Iterable[Grid], problems: Problems)
             if why := MESH_TYPES[mesh.mesh_type].refusal(beam.length, beam.height, size, f"beam '{beam.name}'"):
                 number = config.grids[grid.name].mesh_size.index(size)
                 path, written = part_of(problems.content, ("grids", grid.name, "mesh_size", number))
-                problems.add(path, f"{show(written) if isinstance(written, str) else in_mm(size)} {why}")
+                problems.add(path, f"{show(written) if isinstance(written, str) else number_text(size, 'm')} {why}")
 
 
 # -- definitions -------------------------------------------------------------------------------------------------------

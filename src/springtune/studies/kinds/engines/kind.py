@@ -10,6 +10,7 @@ from springtune.mesh.cells import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.quantities import nearest
 from springtune.registry import import_name
+from springtune.safe_io import number_text
 from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
@@ -121,7 +122,7 @@ def _check(config, problems):
         checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
         beam, size = config.beams[scene.beam], scene.mesh_size
         if refusal := MESH_TYPES[scene.mesh_type].refusal(beam.length, beam.height, size, f"beam '{scene.beam}'"):
-            problems.add((*place, "mesh_size"), f"{checks.in_mm(size)} {refusal}")
+            problems.add((*place, "mesh_size"), f"{number_text(size, 'm')} {refusal}")
     for name, runs in section.runs.items():
         place = "engines", "runs", name
         for engine in runs.engine:

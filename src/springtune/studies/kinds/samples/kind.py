@@ -12,7 +12,7 @@ from springtune.safe_io import number_text
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import MORE_SCENES_REMEDY, check_fit, check_particles, in_mm, most_scenes
+from ...config.checks import MORE_SCENES_REMEDY, check_fit, check_particles, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
 from ...config.messages import refuse, show, words
 from ...config.model import Output, Stage, StudyKind, stem
@@ -233,8 +233,9 @@ def _check_sizes(sample, problems):
     largest = size["high"] * (height["high"] if relative else 1.0)
     side = length["low"] if relative else min(length["low"], height["low"])
     if largest > side:
-        remedy = "a smaller 'to', or longer beams" if relative else f"at most {in_mm(side)}, or a 'relative_mesh_size'"
-        what = f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}"
+        most = number_text(side, "m")
+        remedy = "a smaller 'to', or longer beams" if relative else f"at most {most}, or a 'relative_mesh_size'"
+        what = f"up to {number_text(largest, 'm')} is larger than the smallest side of a beam, {most}"
         problems.add(path, f"{what}; give {remedy}")
     smallest = size["low"] * (height["low"] if relative else 1.0)
     check_particles(problems, path, [smallest], length["high"], height["low" if relative else "high"])
