@@ -11,9 +11,8 @@ import springtune as st
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, oriented_outline
 from springtune.mechanics.network import Network
 from springtune.mesh.cells import signed_areas
-from springtune.problem.compare import band
 from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
-from springtune.studies.kinds.laying.solve import Trapezoid, lay
+from springtune.studies.kinds.laying.solve import Trapezoid, band, lay
 
 from tables import cases
 

@@ -1,6 +1,6 @@
 """Errors of networks against references, and the stiffness without error on a sensitivity curve."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,9 +128,3 @@ def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     for place in map(tuple, np.argwhere(np.isfinite(errors) & np.isfinite(seconds))):
         best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
     return best
-
-
-def band(values: Sequence[float]) -> float:
-    """Return the half-width of the band of a value that scatters from mesh to mesh: twice its largest difference."""
-    known = [value for value in values if np.isfinite(value)]
-    return 2 * (max(known) - min(known)) if len(known) > 1 else float("nan")

@@ -102,18 +102,10 @@ SWEPT = {
 
 PLANES = "stress", "strain"  # plane stress and plane strain: the quantity that is zero across a sheet
 
-BODY_NAMES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name in ("young_modulus", "poisson_ratio")}
-"""Variable of a dataset that holds a parameter of beams or materials."""
-
 MOST_SCENES = 1_000_000
 """Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
 
 MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"  # variable of the environment with another number
-
-
-def shown_order(name: str, value: float) -> float:
-    """Rank of a swept parameter's value: if only one can be shown, it is the last one present."""
-    return -abs(value - 1) if name == "stiffness_scale" else value
 
 
 def with_unit(name: str, value: float, digits: int = 4) -> str:

@@ -11,7 +11,7 @@ import xarray as xr
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
-from springtune.problem.quantities import BODY_NAMES, SWEPT, Status
+from springtune.problem.quantities import SWEPT, Status
 from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear, objection, outline
 from springtune.springs.lattice import predicted_stiffness
@@ -23,7 +23,7 @@ from ...runs import store
 from . import any_reference, stored
 from . import kind as bodies
 from .kind import keeps_fields
-from .outputs import CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, has_pressure
+from .outputs import BODY_NAMES, CASE_AXES, MESH_AXES, SCENE_AXES, SHAPES_OUTPUT, has_pressure
 from .stored import FACE_POSITIONS, FIELD_ARRAYS, fields_key, stored_key
 from .task_values import quantity_key, with_names
 

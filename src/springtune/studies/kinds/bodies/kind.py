@@ -13,7 +13,6 @@ import numpy as np
 
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.problem.quantities import shown_order
 from springtune.problem.shapes import Beam, size_text
 from springtune.reference.answers import unit_problem, unit_scales
 from springtune.safe_io import aligned
@@ -25,7 +24,7 @@ from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, 
 from ...runs.plan import Task
 from ...runs.source import checksum, hash_of, hash_of_text
 from . import shapes as of_shapes
-from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, cache_by_study, mesh_name, stems
+from .outputs import MESH_OF_FILE, OUTPUTS, SHAPES_OUTPUT, cache_by_study, mesh_name, shown_order, stems
 from .stored import CALIBRATION_STEM
 
 Body = tuple[Beam, Material, str]

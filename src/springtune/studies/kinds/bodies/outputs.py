@@ -26,12 +26,20 @@ SWEPT_SHOWN = {
 }
 """Swept parameters: label of an axis, column of a table, and factor on values of the dataset."""
 
+BODY_NAMES = {"thickness": "beam_thickness"} | {name: f"material_{name}" for name in ("young_modulus", "poisson_ratio")}
+"""Variable of a dataset that holds a parameter of beams or materials."""
+
 PLOTS = "studies.kinds.bodies.beam_figures"
 
 TABLE_LABELS = ("load", "mesh_type", "material")  # dimensions with one label in a table, as in the paper
 
 
 cache_by_study = lru_cache(maxsize=8)  # decorator of a function of a study whose last answers are kept
+
+
+def shown_order(name: str, value: float) -> float:
+    """Rank of a swept parameter's value: if only one can be shown, it is the last one present."""
+    return -abs(value - 1) if name == "stiffness_scale" else value
 
 
 def distinct_cells(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:

@@ -99,9 +99,12 @@ def _solve_problem(problem, springs, seconds, task):
 
 def _typical_stiffness(mesh, springs):
     """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
-    sizes, around = springs.relative if springs.linear_springs is None else springs.linear_springs, mesh.on_outline
-    found = {"inside": np.nan if around.all() else np.median(sizes[~around]), "outline": np.median(sizes[around])}
-    found |= {"least": sizes.min(), "most": sizes.max()}
+    sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
+    found = {"least": sizes.min(), "most": sizes.max()}
+    for part, chosen in (("inside", ~mesh.on_outline), ("outline", mesh.on_outline)):
+        there = np.sort(sizes[chosen])  # `np.median` would take a twentieth of a small scene's time
+        count = len(there)
+        found[part] = 0.5 * (there[(count - 1) // 2] + there[count // 2]) if count else np.nan
     return {f"stiffness_{part}": float(springs.reference * value) for part, value in found.items()}
 
 

@@ -6,13 +6,13 @@ import xarray as xr
 
 from springtune.problem.compare import sign_word
 from springtune.problem.loads import LOADS
-from springtune.problem.quantities import BODY_NAMES, SWEPT, shown_order
+from springtune.problem.quantities import SWEPT
 from springtune.problem.shapes import beam_label
 
 from ...output.dataset import STATUS, against_own_laws, cells, group, in_own_plane, labels_of, records, table_rows
 from ...output.present import MOST_ROWS, error_decimals, head
 from ...output.text import decimals, number, range_text
-from .outputs import SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, stem
+from .outputs import BODY_NAMES, SCENE_AXES, SWEPT_SHOWN, TABLE_LABELS, shown_order, stem
 
 
 def tables(tree):
