@@ -282,6 +282,9 @@ def test_two_materials_one_behind_the_other():
     found = solve_shape(shape, load, materials, grouped)
     assert found.values["end"] == pytest.approx(3 / 0.5 * (2 / 100 + 1 / 10), rel=1e-9)
     assert found.values["held"] == pytest.approx(-3.0, rel=1e-9)
+    problem = shapes.Problem(shape, load, materials, grouped)
+    meet = [point for point, one in problem.corners.items() if one.rough and one.what.endswith("meet on the outline")]
+    assert sorted(problem.mesh.points[meet].tolist()) == [[1, 0], [1, 1], [2, 0], [2, 1]]
     with pytest.raises(ValueError, match="parts without a material: 'soft'"):
         solve_shape(shape, load, {"": STEEL}, grouped)
 
@@ -298,17 +301,21 @@ def test_a_round_inclusion():
     shape = st.Shape("disc", thickness, disc(outer, "rim"), (st.Hole(disc(inner), "core"),), points={"out": (0.6, 0.2)})
     quantities = (st.Quantity("energy", "energy"), st.Quantity("out", "displacement", "out", "x"))
     load = st.LoadCase("grow", (st.Support("rim", 1.0, 1.0),), quantities=quantities)
-    drawn = {"rim": lambda points, _: strain * points}
-    found = converge(shape, load, {"": around, "core": core}, displacements=drawn, tolerance=1e-6)
+    materials, drawn = {"": around, "core": core}, {"rim": lambda points, _: strain * points}
+    found = converge(shape, load, materials, displacements=drawn, tolerance=1e-6)
     work = np.pi * outer**2 * strain * thickness * (even * b - odd * c / outer**2)
     assert found.values["energy"] == pytest.approx(work, rel=1e-6)
     r = np.hypot(0.6, 0.2)
     assert found.values["out"] == pytest.approx((b + c / r**2) * 0.6, rel=1e-6)
     np.testing.assert_allclose(found.at(np.array([[0.1, 0.05]])), [[a * 0.1, a * 0.05]], rtol=1e-6)
+    square = st.Hole(tuple(st.Segment(one.start) for one in disc(inner)), "core")
+    for core_outline, corners in ((shape.holes[0], []), (square, [[*one.start] for one in square.outline])):
+        problem = shapes.Problem(replace(shape, holes=(core_outline,)), replace(load, quantities=()), materials, None)
+        assert problem.mesh.points[sorted(problem.rough)].tolist() == corners
     rim = replace(shape, points={"bond": (0.0, inner)})
     jump = replace(load, quantities=(st.Quantity("jump", "stress", "bond", "xx"),))
     with pytest.raises(ValueError, match="'jump': 'bond' is where parts of different materials meet.*jump"):
-        solve_shape(rim, jump, {"": around, "core": core})
+        solve_shape(rim, jump, materials)
     assert found.stress_at(np.array([[0.1, 0.05]]))[0] == pytest.approx([stiff * a, stiff * a, 0], abs=1e-5 * stiff * a)
 
 
