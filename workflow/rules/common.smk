@@ -20,7 +20,7 @@ from springtune.safe_io import remove_unfinished, reset_future_times, rst
 from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import FORMATS
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import keys, locks, plan
+from springtune.studies.runs import locks, plan
 from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder
 
 BEGUN = time.time()
@@ -168,7 +168,6 @@ def begin():
             locks.claim(folder, one.path)
             for job in jobs.values():
                 job.write()
-            keys.write_digests(folder)
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:

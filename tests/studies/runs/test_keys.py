@@ -29,18 +29,6 @@ def test_a_digest_changes_with_what_is_computed_and_not_with_what_is_for_readers
     assert changed != MODULE and (keys.digest_of(changed) != keys.digest_of(MODULE)) == (computed == "computed")
 
 
-@pytest.mark.parametrize("damaged", [False, True])
-def test_noted_digests_are_taken_over_unless_they_are_damaged(damaged, tmp_path, monkeypatch):
-    code, note = Path(keys.__file__), tmp_path / keys.DIGESTS
-    digest = keys.file_digest(code)
-    keys.write_digests(tmp_path)
-    note.write_text(note.read_text().replace(digest, "other")) if damaged else None
-    monkeypatch.setattr(keys, "NOTED", {})
-    monkeypatch.setattr(keys, "digest_of", lambda content: "parsed")
-    keys.read_digests(tmp_path)
-    assert keys.file_digest.__wrapped__(code) == ("parsed" if damaged else digest)
-
-
 # -- imports -----------------------------------------------------------------------------------------------------------
 
 

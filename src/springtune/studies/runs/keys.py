@@ -26,11 +26,10 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.shapes import Beam
 from springtune.registry import Declaration, ExtensibleMapping, plugin_packages
-from springtune.safe_io import write_json
 from springtune.springs.base import DEFINITIONS
 
 from ..config.model import Study, kinds
-from .source import COMMIT_FILE, PACKAGE, TASKS, checksum, clone, hash_of, read_note
+from .source import COMMIT_FILE, PACKAGE, checksum, clone, hash_of
 
 CARRIER_PACKAGES = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
 """Packages whose versions do not influence results: they carry numbers as they are."""
@@ -71,37 +70,11 @@ def digest_of(text: str | bytes) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-DIGESTS = f"{TASKS}/code.json"  # note of `NOTED` for jobs and the next run: parsing takes half a second
-
-NOTED: dict[str, str] = {}  # digests of code by the plain hash of its file
-
-
 @cache
 def file_digest(path: Path) -> str:
     """Hash of a file of code as it computes, or of a template."""
     content = path.read_bytes()
-    plain = hashlib.sha256(content).hexdigest()
-    if path.suffix != ".py":
-        return plain
-    return NOTED.get(plain) or NOTED.setdefault(plain, digest_of(content))
-
-
-def read_digests(folder: Path) -> None:
-    """Take over the digests that a study has noted; none if they are damaged or another version made them."""
-    note = read_note(folder / DIGESTS)
-    if note.get("checksum") == _checksum_of_digests(note.get("digests")):
-        NOTED.update(note["digests"])
-
-
-def write_digests(folder: Path) -> None:
-    """Note the digests of this process for a study, unless they are noted."""
-    note = {"digests": NOTED, "checksum": _checksum_of_digests(NOTED)}
-    if read_note(folder / DIGESTS) != note:
-        write_json(folder / DIGESTS, note)
-
-
-def _checksum_of_digests(digests: Any) -> str:
-    return hash_of(checksum(__file__), sys.version_info[:2], digests)
+    return digest_of(content) if path.suffix == ".py" else hashlib.sha256(content).hexdigest()
 
 
 class Closure(NamedTuple):

@@ -16,7 +16,7 @@ from springtune.safe_io import write_bytes
 
 from ..config.model import FORMATS, Output, Stage, Study, kinds, modules, outputs, view_files
 from . import attempts, store
-from .keys import inputs, read_digests, stage_key
+from .keys import inputs, stage_key
 from .source import PACKAGE, RECORDS, TASKS, checksum, hash_of, read_note
 
 MOST_JOBS = 64  # most jobs of a stage
@@ -101,7 +101,6 @@ def stages() -> tuple[Stage, ...]:
 
 def stage_jobs(study: Study, folder: Path) -> dict[str, Job]:
     """Jobs of a study's stages by name; nothing is written."""
-    read_digests(folder)
     jobs, bundles = dict[str, Job](), dict[str, dict[str, list[str]]]()
     tasks: dict[str, dict[str, list[Task]]] = {}
     for kind in kinds():
