@@ -16,7 +16,7 @@ The module does not depend on meshes: `springtune.mesh.sheets` has the groups of
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -505,21 +505,6 @@ class LoadCase:
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{what}: two quantities are named {twice[0]!r}; rename one")
 
-    def scaled(self, scale: float) -> "LoadCase":
-        """Return the case with all that it prescribes, and expects, times a factor [1]."""
-
-        def times(value: float | None, power: int = 1) -> float | None:
-            return None if value is None else value * scale**power
-
-        expected = [times(one.expected, 2 if one.kind == "energy" else 1) for one in self.quantities]
-        return replace(
-            self,
-            supports=tuple(replace(one, x=times(one.x), y=times(one.y)) for one in self.supports),
-            tractions=tuple(replace(one, force=(scale * one.force[0], scale * one.force[1])) for one in self.tractions),
-            pressures=tuple(replace(one, pressure=scale * one.pressure) for one in self.pressures),
-            gravity=(scale * self.gravity[0], scale * self.gravity[1]),
-            quantities=tuple(replace(one, expected=value) for one, value in zip(self.quantities, expected)),
-        )
 
 
 def check_names(

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -253,7 +254,7 @@ class ShapeProblem(BoundaryProblem):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
         self.scale: float = float(scale)
         self.size, self.force = abs(self.scale), 1.0
-        self.case = choose(shape.loads, load, "load").scaled(self.scale)
+        self.case = scaled(choose(shape.loads, load, "load"), self.scale)
         self.load, self.cache = self.case.name, cache_of(self.mesh, self.thickness, cache)
         if not self.case.quantities:
             raise ValueError(f"load {load!r}: has no quantities; give it some, the main one first")
@@ -337,6 +338,24 @@ def cache_of(mesh: Mesh, thickness: float, cache: MeshCache | None) -> MeshCache
     if not isinstance(cache, MeshCache) or cache.mesh is not mesh or cache.thickness != thickness:
         raise ValueError(f"cache: {cache!r} is not of this mesh and thickness; give that of a scene like this, or none")
     return cache
+
+
+def scaled(case: LoadCase, scale: float) -> LoadCase:
+    """Load case with all that it prescribes times a factor."""
+    if scale == 1:
+        return case
+
+    def times(value: float | None, power: int = 1) -> float | None:
+        return None if value is None else value * scale**power
+
+    return LoadCase(
+        case.name,
+        tuple(replace(one, x=times(one.x), y=times(one.y)) for one in case.supports),
+        tuple(replace(one, force=(scale * one.force[0], scale * one.force[1])) for one in case.tractions),
+        tuple(replace(one, pressure=scale * one.pressure) for one in case.pressures),
+        (scale * case.gravity[0], scale * case.gravity[1]),
+        tuple(replace(one, expected=times(one.expected, 2 if one.kind == "energy" else 1)) for one in case.quantities),
+    )
 
 
 def _materials(material: Materials, grouped: GroupedMesh) -> dict[str, AnyMaterial]:
