@@ -506,7 +506,6 @@ class LoadCase:
             raise ValueError(f"{what}: two quantities are named {twice[0]!r}; rename one")
 
 
-
 def check_names(
     case: LoadCase, sides: Iterable[str], points: Iterable[str], unusable: Mapping[str, str] | None = None
 ) -> None:
