@@ -13,10 +13,10 @@ import xarray as xr
 from springtune.studies.runs import plan
 
 from campaigns import Campaign
-from tables import STUDIES
+from tables import STUDIES, slow_but
 
 FOLDER = Path("results/survival")
-KILLS = (1, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 3, 5)), 8)
+KILLS = slow_but([1, 8], [1, 2, 3, 5, 8])
 """Renamings of a finished file at which the run is killed."""
 
 
@@ -87,7 +87,7 @@ def test_a_killed_run_goes_on(whole, started, monkeypatch, number):
     good(whole)
 
 
-@pytest.mark.parametrize("size", [500, pytest.param(3000, marks=pytest.mark.slow), 20_000, 60_000])
+@pytest.mark.parametrize("size", slow_but([500, 20_000], [500, 3000, 20_000, 60_000]))
 def test_a_full_disk_ends_the_run_and_spoils_nothing(whole, started, size):
     def limited():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
@@ -97,7 +97,7 @@ def test_a_full_disk_ends_the_run_and_spoils_nothing(whole, started, size):
     good(whole)
 
 
-@pytest.mark.parametrize("how", ["cut", "flipped", "emptied"])
+@pytest.mark.parametrize("how", slow_but(["flipped"], ["cut", "flipped", "emptied"]))
 def test_a_damaged_file_is_named_or_made_again(whole, tmp_path, monkeypatch, how):
     every = sorted((whole[0] / FOLDER).rglob("*"))
     files = {(path.parent, path.suffix): path for path in every if path.suffix in (".h5", ".json")}

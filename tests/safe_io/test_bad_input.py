@@ -157,7 +157,7 @@ def test_a_definition_and_a_mesh_type_that_return_something_else_are_refused():
 class TestFiles:
     def test_many_points_at_one_place_are_found_at_once(self, tmp_path):
         """Pairs of them all would be billions."""
-        whole = right(0.1, 0.02, 5e-4)
+        whole = right(0.1, 0.02, 1e-3)
         corners = whole.triangles.ravel()
         points = np.column_stack([whole.points[corners], np.zeros(len(corners))])
         meshio.Mesh(points, [("triangle", np.arange(len(corners)).reshape(-1, 3))]).write(tmp_path / "own.vtu")

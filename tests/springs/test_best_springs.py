@@ -100,6 +100,7 @@ def test_negative_springs_and_second_neighbours_do_better():
     assert len(farther.springs.relative) == len(farther.mesh.edges) > len(space().mesh.edges)
 
 
+@pytest.mark.slow
 def test_slender_sheets_are_fitted_too():
     """Loads that hardly move the sheet do not outweigh all others."""
     beam = st.Beam("100 mm", "2 mm")

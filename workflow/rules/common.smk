@@ -4,6 +4,7 @@ Reading a Snakefile writes nothing.
 """
 
 import gc
+import json
 import os
 import re
 import sys
@@ -20,8 +21,8 @@ from springtune.safe_io import remove_unfinished, reset_future_times, rst
 from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import FORMATS
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import locks, plan
-from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder
+from springtune.studies.runs import keys, locks, plan
+from springtune.studies.runs.source import DIGESTS, STATE, USUAL_STUDY, config_file, source_state, workflow_folder
 
 BEGUN = time.time()
 """Start of this run [s since the epoch]; its products are newer."""
@@ -90,6 +91,7 @@ gc.disable()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 JOBS = plan.jobs(STUDY, RESULTS)
+os.environ[DIGESTS] = json.dumps(keys.digests())
 gc.freeze()
 gc.enable()
 plan.STUDIES_READ.append((STUDY, JOBS))

@@ -1,6 +1,7 @@
 """Keys follow what is computed: the code without what is written for readers, and the packages that it imports."""
 
 import importlib.metadata
+import json
 import sys
 from fnmatch import fnmatch
 from pathlib import Path
@@ -12,6 +13,7 @@ import springtune as st
 from springtune.studies.kinds.bodies.kind import REFERENCES_OF_SHAPES, SHAPE_MODULES
 from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
+from springtune.studies.runs.source import DIGESTS, STATE, source_state
 
 from campaigns import forget_keys
 
@@ -27,6 +29,16 @@ def test_a_digest_changes_with_what_is_computed_and_not_with_what_is_for_readers
     changed = MODULE.replace(before, after)
     compile(changed, "changed", "exec")
     assert changed != MODULE and (keys.digest_of(changed) != keys.digest_of(MODULE)) == (computed == "computed")
+
+
+def test_a_job_takes_the_digests_of_its_run_unless_the_package_changed(monkeypatch):
+    path = keys.PACKAGE / "units.py"
+    for state, found in ((source_state(), "of the run"), ("of before", keys.file_digest(path))):
+        monkeypatch.setenv(STATE, state)
+        monkeypatch.setenv(DIGESTS, json.dumps({str(path): "of the run"}))
+        keys.digests.cache_clear()
+        assert keys.file_digest(path) == found
+    keys.digests.cache_clear()
 
 
 # -- imports -----------------------------------------------------------------------------------------------------------
@@ -125,7 +137,7 @@ def own(tmp_path, monkeypatch):
         name = f"own_{tmp_path.name}_{next(number)}"
         (tmp_path / f"{name}.py").write_text(text)
         importlib.import_module(name)
-        keys.file_digest.cache_clear()
+        keys.digests.cache_clear()
         found = keys.declared_closure(st.DEFINITIONS["own"])
         st.DEFINITIONS.discard("own")
         sys.modules.pop(name)

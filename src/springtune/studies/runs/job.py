@@ -1,6 +1,5 @@
 """A job of a stage, ``python -m springtune.studies.runs.job TASKS RECORD DIGEST STUDY``."""
 
-import os
 import sys
 import warnings
 from pathlib import Path
@@ -10,7 +9,7 @@ from springtune.problem.shapes import AssumptionWarning
 from springtune.safe_io import write_json
 
 from .attempts import do_in_worker
-from .source import PACKAGE, RECORDS, STATE, TASKS, hash_of, read_note, source_state
+from .source import RECORDS, TASKS, check_source, hash_of, read_note
 from .store import DamagedError
 
 
@@ -27,8 +26,7 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
         note = _note(tasks, digest)
     if not note:
         raise SystemExit(f"{study} was changed while it ran; call the same command again")
-    if os.environ.get(STATE, source_state()) != source_state():
-        raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
+    check_source()
     try:
         computed = do_in_worker(note["module"], note["content"])
     except DamagedError as error:

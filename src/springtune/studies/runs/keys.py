@@ -29,7 +29,7 @@ from springtune.registry import Declaration, ExtensibleMapping, plugin_packages
 from springtune.springs.base import DEFINITIONS
 
 from ..config.model import Study, kinds
-from .source import COMMIT_FILE, PACKAGE, checksum, clone, hash_of
+from .source import COMMIT_FILE, DIGESTS, PACKAGE, STATE, checksum, clone, hash_of, source_state
 
 CARRIER_PACKAGES = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
 """Packages whose versions do not influence results: they carry numbers as they are."""
@@ -71,8 +71,18 @@ def digest_of(text: str | bytes) -> str:
 
 
 @cache
+def digests() -> dict[str, str]:
+    """Digests of files by path: at first those that the run hands to its jobs, unless a file of the package changed."""
+    known: dict[str, str] = json.loads(os.environ.get(DIGESTS, "{}"))
+    return known if known and os.environ.get(STATE) == source_state() else {}
+
+
 def file_digest(path: Path) -> str:
     """Hash of a file of code as it computes, or of a template."""
+    return digests().get(str(path)) or digests().setdefault(str(path), _content_digest(path))
+
+
+def _content_digest(path: Path) -> str:
     content = path.read_bytes()
     return digest_of(content) if path.suffix == ".py" else hashlib.sha256(content).hexdigest()
 
