@@ -31,16 +31,8 @@ from springtune.problem.quantities import Status
 from springtune.safe_io import write_json, write_text
 
 from ..config.model import view_files
-from . import reading
-from .answers import (
-    ERROR_COLOURS,
-    ERROR_RANGE,
-    DefinitionErrors,
-    answerable,
-    definition_errors,
-    status_words,
-    what_to_type,
-)
+from . import answers, reading
+from .answers import ERROR_COLOURS, ERROR_RANGE, DefinitionErrors, definition_errors, status_words
 from .dataset import against_own_laws, columns, flag_words, requested_cells, sign_of_errors
 from .text import label_text, range_text
 
@@ -358,8 +350,8 @@ def _errors(source: Source, data: xr.Dataset) -> Content:
     content: Content = {"source": source, "finite_strain": "finite_strain" in data.attrs, "answers": []}
     if source.body:
         by = [source.body, "mesh_type", "material"]
-        content["answers"] = [*islice(what_to_type(cells, by), MOST_ANSWERS)]  # each takes some milliseconds
-        content["further"] = cells[answerable(cells)].groupby(by).ngroups - MOST_ANSWERS
+        content["answers"] = [*islice(answers.what_to_type(cells, by), MOST_ANSWERS)]  # each takes some milliseconds
+        content["further"] = cells[answers.answerable(cells)].groupby(by).ngroups - MOST_ANSWERS
     if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
         pairs = cells[[source.body, "mesh_size"]].drop_duplicates()
         alike = len(pairs) == pairs[source.body].nunique() * pairs.mesh_size.nunique()
