@@ -60,18 +60,14 @@ class Answer(NamedTuple):
         return float(np.median(np.abs(self.errors)))
 
 
-def answerable(cells: "pd.DataFrame") -> "pd.Series":
-    """Whether cells have a valid error and a spring: energies alone have no stiffness to type."""
-    springs = cells.reindex(columns=["stiffness_inside", "stiffness_outline"])
-    return np.isfinite(cells.valid_error) & (springs.abs().max(axis=1) > 0)
-
-
 def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "material")) -> Iterator[tuple[Answer, ...]]:
     """Return the best springs alone, uniform stiffness and springs with energies, on each finest mesh."""
     if "stiffness_inside" not in cells:
         return
     membrane = cells.get("material_young_modulus", np.nan) * cells.get("beam_thickness", np.nan)
-    cells = cells.assign(ratio=cells.stiffness_inside / membrane, known=answerable(cells))
+    # Energies alone have no stiffness to type.
+    has_springs = cells[["stiffness_inside", "stiffness_outline"]].abs().max(axis=1) > 0
+    cells = cells.assign(ratio=cells.stiffness_inside / membrane, known=np.isfinite(cells.valid_error) & has_springs)
     for labels, here in cells.groupby([*by], sort=False):
         size, answers = here.mesh_size[here.known].min(), []
         for name, own in here[here.mesh_size == size].groupby("definition"):

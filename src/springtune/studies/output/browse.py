@@ -31,8 +31,8 @@ from springtune.problem.quantities import Status
 from springtune.safe_io import write_json, write_text
 
 from ..config.model import view_files
-from . import answers, reading
-from .answers import ERROR_COLOURS, ERROR_RANGE, DefinitionErrors, definition_errors, status_words
+from . import reading
+from .answers import ERROR_COLOURS, ERROR_RANGE, DefinitionErrors, definition_errors, status_words, what_to_type
 from .dataset import against_own_laws, columns, flag_words, requested_cells, sign_of_errors
 from .text import label_text, range_text
 
@@ -347,11 +347,11 @@ def _errors(source: Source, data: xr.Dataset) -> Content:
     """Stiffnesses to type, errors of definitions, and errors over run time."""
     cells = requested_cells(data, source.error)
     cells["percent"] = (100 * cells.valid_error.abs()).clip(lower=SMALLEST_PERCENT)
-    content: Content = {"source": source, "finite_strain": "finite_strain" in data.attrs, "answers": []}
-    if source.body:
-        by = [source.body, "mesh_type", "material"]
-        content["answers"] = [*islice(answers.what_to_type(cells, by), MOST_ANSWERS)]  # each takes some milliseconds
-        content["further"] = cells[answers.answerable(cells)].groupby(by).ngroups - MOST_ANSWERS
+    by = source.body, "mesh_type", "material"
+    # Each takes some milliseconds.
+    typed = [*islice(what_to_type(cells, by), MOST_ANSWERS + 1)] if source.body else []
+    content: Content = {"source": source, "finite_strain": "finite_strain" in data.attrs}
+    content |= {"answers": typed[:MOST_ANSWERS], "more_answers": len(typed) > MOST_ANSWERS}
     if source.body and {"solve_seconds", "definition_seconds"} <= {*cells}:
         pairs = cells[[source.body, "mesh_size"]].drop_duplicates()
         alike = len(pairs) == pairs[source.body].nunique() * pairs.mesh_size.nunique()

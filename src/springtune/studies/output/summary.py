@@ -248,8 +248,7 @@ def other_study_report(study: "Study", jobs: Jobs, since: float) -> str:
 
 
 def _last_line(log: Path) -> str:
-    lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
-    if lines:
+    if lines := [line for line in log.read_text(errors="replace").splitlines() if line.strip()]:
         return lines[-1].strip()
     room = os.statvfs(log.parent)
     return "the log is empty" + ": the disk is full; make room" * bool(room.f_blocks and not room.f_bavail)
