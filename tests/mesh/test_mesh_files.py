@@ -159,10 +159,13 @@ def test_one_body_in_many_files(tmp_path, name):
 
 
 def test_sets_that_are_left_out_have_a_reason(tmp_path):
-    text = ABAQUS["entities of Gmsh"] + "*SURFACE, NAME=Right\n4, S2\n*SURFACE, NAME=top\n5, S2\n"
+    text = (
+        ABAQUS["entities of Gmsh"] + "*SURFACE, NAME=Right\n4, S2\n*SURFACE, NAME=top\n5, S2\n*NSET, NSET=far\n4, 99\n"
+    )
     (tmp_path / "a.inp").write_text(text)
     assert read_shape(tmp_path / "a.inp", 1e-3).unusable == {
         "top": "is a `*SURFACE`, which is not read; give a set of its points",
+        "far": "has what is not in the file; remove this",
         "Surface1": "is no part, as others have a `*SOLID SECTION` or an `*ELSET`; use these",
         "Surface2": "is no part, as others have a `*SOLID SECTION` or an `*ELSET`; use these",
     }

@@ -227,14 +227,16 @@ def test_numbers_of_parts_are_their_names(tmp_path):
     assert list(read_shape(tmp_path / "part.vtu").parts) == ["7"]
 
 
-def lines(grouped, **more):
-    """A file's content with lines of its own."""
+def lines(grouped, points=slice(0), **more):
+    """A file's content with lines of its own, and points of the name of the first."""
     cells = [("triangle", grouped.mesh.triangles), *(("line", np.array(edges)) for edges in more.values())]
     data = {
         name: [np.full(len(found), i == number + 1, dtype=np.int8) for i, (_, found) in enumerate(cells)]
         for number, name in enumerate(more)
     }
-    return meshio.Mesh(grouped.mesh.points, cells, cell_data=data)
+    chosen = np.zeros(len(grouped.mesh.points), dtype=np.int8)
+    chosen[points] = 1
+    return meshio.Mesh(grouped.mesh.points, cells, {next(iter(more)): chosen} if chosen.any() else {}, data)
 
 
 def inner_edges(grouped):
@@ -254,7 +256,9 @@ def test_what_cannot_be_a_group_is_said_when_it_is_used(tmp_path, name):
     found = read_shape(path)
     assert says in found.unusable["cut"]
     case = st.LoadCase("pull", [st.Support("cut", 0, 0)], gravity=(0, -9.81))
-    with pytest.raises(ValueError, match=r"load 'pull', support: 'cut' .*; (take|mark|put|a cell)") as caught:
+    with pytest.raises(
+        ValueError, match=r"load 'pull', support: 'cut' .*; (take|mark|put|remove|rename|a cell)"
+    ) as caught:
         check_case(found, case)
     assert says in str(caught.value)
 

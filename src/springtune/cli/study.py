@@ -243,8 +243,8 @@ def set_cache() -> None:
 
 READ_ONLY_OPTIONS = {
     "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--dry-run", "--dryrun", "--filegraph",
-    "--lc", "--li", "--lint", "--list", "--list-changes", "--list-code-changes", "--list-input-changes",
-    "--list-params-changes", "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp",
+    "--lc", "--li", "--lint", "--list", "--list-changes", "--list-input-changes",
+    "--list-params-changes", "--list-rules", "--list-target-rules", "--list-untracked", "--lp",
     "--lt", "--lu", "--report", "--rulegraph", "--summary", "--unlock", "-D", "-S", "-l", "-n", "-np",
 }  # fmt: skip
 """Options of Snakemake that compute nothing."""
