@@ -77,11 +77,6 @@ def delete_first(pattern):
     sorted(driver.FOLDER.glob(pattern))[0].unlink()
 
 
-def touch_everything():
-    for path in sorted(driver.FOLDER.glob("**/*.*")):
-        os.utime(path)
-
-
 def move_mesh():
     """The mesh file, in another folder and by another name."""
     Path("meshes").mkdir()
@@ -118,7 +113,7 @@ STUDY = {name: row(**one | {"change": change_of(one["change"])}) for name, one i
 STORED = {
     f"{what} deleted": row(partial(delete_first, one["path"]), one.get("jobs", ""), one.get("solved"))
     for what, one in TABLE["files"].items()
-} | {"everything touched": row(touch_everything)}
+} | {"everything touched": row(lambda: [os.utime(path) for path in driver.FOLDER.glob("**/*.*")])}
 CODE = {
     name: (one["module"], one.get("edit"), row(None, one.get("jobs", ""), one.get("solved")))
     for name, one in TABLE["code"].items()
