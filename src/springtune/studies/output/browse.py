@@ -46,7 +46,7 @@ BOKEH_SCRIPTS = ("bokeh", "bokeh-api")  # scripts of BokehJS that the page needs
 class Plot:
     """A plot of a group; readers choose along unnamed dimensions.
 
-    `by` has one line a label, or is a map's y axis. A line joins the points `along` a dimension if `x` is a variable.
+    `by` has one line per label, or is a map's y axis. A line joins the points `along` a dimension if `x` is a variable.
     `log` names logarithmic axes ("x", "y", "xy"), which show magnitudes.
     """
 

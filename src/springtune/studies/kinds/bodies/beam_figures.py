@@ -189,7 +189,7 @@ def title_labels(selection, *names):
 
 
 def by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data, beams and selection of a figure with one panel a beam; without kinematics `in_usual_kinematics`."""
+    """Data, beams and selection of a figure with one panel per beam; without kinematics `in_usual_kinematics`."""
     if beam is not None:
         choose(root.status != 0, beam=beam)
         root = root.sel(beam=[beam])

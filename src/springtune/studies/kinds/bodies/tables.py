@@ -116,7 +116,7 @@ STATUS_MARKS = {"solved": "", "unstable": "u", "linear_only": "l"}  # marks of n
 
 
 def _page_cells(rows, definitions, swept, finite):
-    """Cells of the page, a line for each mesh, load and kinematics, two columns a definition, the best first."""
+    """Cells of the page, a line for each mesh, load and kinematics, two columns per definition, the best first."""
     data = pd.DataFrame(rows)
     length = decimals(data[["network_mm", "reference_mm"]].to_numpy().ravel())
     percent, printed = error_decimals(data["error_percent"]), data["printed_displacement_mm"].notna().any()
