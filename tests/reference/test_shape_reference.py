@@ -13,7 +13,7 @@ from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
 from springtune.reference import shapes
 from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
-from springtune.reference.triangles import side_fit, side_functions, tabulated
+from springtune.reference.triangles import local_functions, shape_functions, side_fit, side_functions, tabulated
 
 from problems import asked, pulled
 from tables import slow_but
@@ -246,18 +246,15 @@ SIDE_NAMES = {TOP: "upper", BOTTOM: "lower", LEFT: "left", RIGHT: "right"}
 @pytest.mark.parametrize("kind", LOAD_KINDS.values(), ids=LOAD_KINDS)
 def test_rectangles_agree_with_their_own_reference(kind):
     beam, component = st.Beam(0.1, 0.04, 1e-3), "xy"[kind.axis]
-    held = (
-        st.Support(SIDE_NAMES[side], *(0.0 if axis in axes else None for axis in range(2))) for side, axes in kind.held
-    )
+    given = {SIDE_NAMES[side]: [0.0 if axis in axes else None for axis in range(2)] for side, axes in kind.held}
+    held = tuple(st.Support(side, *values) for side, values in given.items())
     force = (1e3, 0.0) if kind.axis == 0 else (0.0, 1e3)
     quantities = [st.Quantity("mean", "displacement", SIDE_NAMES[kind.loaded], component)]
     points = {}
     if kind.pressed:
         points = {"middle": (beam.length / 2, beam.height)}
         quantities.append(st.Quantity("middle", "displacement", "middle", component))
-    load = st.LoadCase(
-        "load", tuple(held), (st.Traction(SIDE_NAMES[kind.loaded], force),), quantities=tuple(quantities)
-    )
+    load = st.LoadCase("load", held, [st.Traction(SIDE_NAMES[kind.loaded], force)], quantities=quantities)
     shape = st.Shape.rectangle(beam.length, beam.height, thickness=beam.thickness, points=points)
     found, known = solve_shape(shape, load, STEEL), solve_small_strain(beam, STEEL, 1e3, kind=kind)
     exact = {"mean": known.mean_displacement, "middle": known.displacement}
@@ -358,12 +355,14 @@ def test_scaled():
     np.testing.assert_allclose(scaled.stress_at(points), direct.stress_at(points), rtol=1e-6)
 
 
+CLAMPED = (st.Support("left", 0.0, 0.0),)
+
+
 def square(quantities, supports=None, points=None, **load):
     """A unit square, clamped on the left."""
-    supports = (st.Support("left", 0.0, 0.0),) if supports is None else supports
-    return st.Shape.rectangle(1.0, 1.0, thickness=1.0, points=points or {}), st.LoadCase(
-        "load", supports, quantities=quantities, **load
-    )
+    supports = CLAMPED if supports is None else supports
+    load = st.LoadCase("load", supports, quantities=quantities, **load)
+    return st.Shape.rectangle(1.0, 1.0, thickness=1.0, points=points or {}), load
 
 
 def test_point_forces():
@@ -379,6 +378,39 @@ def test_point_forces():
     spread = solve_shape(*square((under,), points=points, tractions=even), st.Material(1.0, 0.3))
     both = found.error_estimates["far"] + spread.error_estimates["under"]
     assert found.values["far"] == pytest.approx(spread.values["under"], rel=both)
+
+
+@pytest.mark.parametrize(("x", "y"), [(5.0, 0.5), (3.7, 0.51)])  # on a side of triangles, and in one
+def test_points_inside(x, y):
+    """A cantilever far from its ends: Navier's stress along it, and none across it."""
+    shape = st.Shape.rectangle(10.0, 1.0, thickness=1.0, points={"inside": (x, y)})
+    stresses = asked(along="stress inside xx", across="stress inside yy")
+    load = st.LoadCase("bend", CLAMPED, (st.Traction("right", (0.0, 1.0)),), quantities=stresses)
+    found = solve_shape(shape, load, st.Material(1.0, 0.3))
+    assert found.values["along"] == pytest.approx(12 * (10 - x) * (0.5 - y), rel=found.error_estimates["along"])
+    assert found.values["across"] == 0  # exact: what is less than its error
+
+
+def test_corners_that_need_smaller_triangles():
+    """Between rollers a body goes on as its mirror image, if its material is one of itself."""
+    rollers = (st.Support("left", x=0.0), st.Support("lower", y=0.0))
+    shape, load = square((), rollers, tractions=(st.Traction("right", (1.0, 0.0)),))
+    for sheet, corners in ((STEEL, [[1, 0], [1, 1]]), (any_sheet(3), [[0, 0], [0, 1], [1, 0], [1, 1]])):
+        problem = shapes.Problem(shape, load, {"": sheet}, None)
+        assert sorted(problem.mesh.points[sorted(problem.rough)].tolist()) == corners
+    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [2, 1], [2, 2], [1, 2]])
+    mesh = st.Mesh(points, np.zeros((0, 3), dtype=int), np.array([[0, 1, 2, 3], [2, 4, 5, 6]]))
+    sides = {"left": np.array([[3, 0]]), "lower": np.array([[0, 1]]), "right": np.array([[4, 5]])}
+    touching = st.Shape("touching", 1.0, file="touching.msh"), load, {"": STEEL}, st.GroupedMesh(mesh, sides)
+    problem = shapes.Problem(*touching)
+    assert sorted(problem.mesh.points[[*problem.rough]].tolist()) == [[1, 1], [2, 1], [2, 2]]
+
+
+@pytest.mark.parametrize(("lower", "degree"), [(2, 3), (3, 8)])
+def test_functions_of_a_degree_are_among_those_of_a_higher_one(lower, degree):
+    points = np.random.default_rng(0).uniform(0, 0.5, (9, 2))
+    for few, many in zip(shape_functions(lower, points), shape_functions(degree, points)):
+        np.testing.assert_allclose(many[:, local_functions(lower, degree)], few, rtol=0, atol=1e-9)
 
 
 def test_points_that_are_held():

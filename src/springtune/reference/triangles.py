@@ -43,6 +43,8 @@ SMALL_TURN = 1e-3  # turn of an outline that counts as zero for stresses [rad]
 
 UNGRADED_ANGLE = np.radians(91)  # largest angle of a corner without supports and loads that needs no grading [rad]
 
+LEAST_SHARE = 0.05  # smallest triangle that a point inside another one may cut off, over that one
+
 LEAST_SIDES_ALONG = 4  # sides of triangles along the extent of a shape, at least
 
 
@@ -135,11 +137,17 @@ class CoarseMesh:
         shares = 0.5 * np.stack(
             [turn(where, corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]) for i in range(3)], axis=1
         )
-        row = int(np.argmax(shares.min(axis=1) / signed_areas(self.points, self.triangles)))
-        a, b, c = (int(corner) for corner in self.triangles[row])
+        shares /= signed_areas(self.points, self.triangles)[:, None]
+        row = int(np.argmax(shares.min(axis=1)))
+        a, b, c = (int(corner) for corner in np.roll(self.triangles[row], -1 - np.argmin(shares[row])))
         new = len(self.points)
-        self.points, self.named = np.concatenate([self.points, where[None]]), self.named | {name: new}
-        self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)])
+        if shares[row].min() < LEAST_SHARE and (min(a, b), max(a, b)) not in self.sides:
+            self.bisect(a, b)  # the side that the point is next to
+            self.points[new] = where
+        else:
+            self.points = np.concatenate([self.points, where[None]])
+            self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)])
+        self.named = self.named | {name: new}
 
     def part_sides(self) -> dict[_Ends, list[tuple[int, bool]]]:
         """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
