@@ -347,9 +347,8 @@ def find_tags(tags: np.ndarray, requested: list[np.ndarray]) -> list[np.ndarray]
     twice = ordered[1:][ordered[1:] == ordered[:-1]]
     if len(twice):
         raise MeshError(f"points have one number twice: {twice[0]}; renumber them")
-    at = np.searchsorted(ordered, flat)
-    missing = np.append(ordered, -1)[at] != flat
+    missing = ~np.isin(flat, ordered)
     if missing.any():
         raise MeshError(f"a cell has point {flat[missing][0]}, which the file does not have; write all points")
-    parts = np.split(order[at], np.cumsum([one.size for one in requested[:-1]]))
+    parts = np.split(order[np.searchsorted(ordered, flat)], np.cumsum([one.size for one in requested[:-1]]))
     return [part.reshape(one.shape) for part, one in zip(parts, requested)]
