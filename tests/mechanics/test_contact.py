@@ -134,10 +134,7 @@ def test_outline_has_the_body_on_its_left(mesh_type):
 def test_strip_lies_on_the_trapezoid(definition, size):
     laid = lay(STRIP, TRAPEZOID, RUBBER, STEEL, definition, size)
     assert laid.message == "" and laid.load_share == 1.0
-    assert laid.area_under_strip == pytest.approx(
-        585e-6, rel=0.01
-    )  # what lies under it besides is the gap at either foot
-    assert laid.area_under_strip > 585e-6
+    assert 585e-6 < laid.area_under_strip <= 1.01 * 585e-6  # what lies under it besides is the gap at either foot
     assert laid.penetration <= 1e-3
     assert abs(laid.contact_force_error) <= 1e-9
     assert abs(laid.elongation) < 0.015
@@ -338,9 +335,8 @@ def test_sliding_friction_is_the_normal_force_times_the_coefficient(way):
     assert normal > 0
     # Slips of a quarter of 1 mm, over SLIP * size: within 1 - 1 / sqrt(1 + (2e-6 / 2.5e-4)^2) = 3e-5 of the limit.
     assert along == pytest.approx(-way * 0.3 * normal, rel=1e-4)
-    assert (
-        np.linalg.norm(contact.drag, axis=1) <= 0.3 * contact.forces * (1 + 1e-4) + 1e-9 * contact.forces.max()
-    ).all()
+    most = 0.3 * contact.forces * (1 + 1e-4) + 1e-9 * contact.forces.max()
+    assert (np.linalg.norm(contact.drag, axis=1) <= most).all()
 
 
 def capstan(friction, wrap, size, radius=1e-2, thickness=4e-4, ratio=0.2):

@@ -114,6 +114,8 @@ def test_curve_next_to_buckling_is_followed_where_the_beam_bends():
     assert (stable == (stiffness > 798.3)).all()
     for place in np.flatnonzero(stable)[:4]:
         assert values[place] == pytest.approx(on_the_path(problem, weights, -0.548311 / stiffness[place]), rel=1e-6)
+    last = StablePath(problem, weights, -0.548311 / stiffness[stable][:1])  # which no series about rest serves
+    assert last.values == pytest.approx(values[stable][:1], rel=1e-6)
 
 
 @pytest.mark.parametrize(("mesh_type", "best"), [("structured", 848.40), ("alternating", None)])
@@ -121,9 +123,8 @@ def test_best_stiffness_is_of_a_stable_equilibrium(mesh_type, best):
     problem, weights = beam_problem(mesh_type, 0.06, 0.02, 2.5e-3)
     force, stiffness = -0.548311, RATIOS * COEFFICIENT * 1e3
     path = StablePath(problem, weights, force / stiffness)
-    reference = solve_small_strain(
-        st.Beam(0.06, 0.02, 1e-3, "60x20"), st.Material(1e6, 0.5, name="rubber"), force
-    ).displacement
+    beam, rubber = st.Beam(0.06, 0.02, 1e-3, "60x20"), st.Material(1e6, 0.5, name="rubber")
+    reference = solve_small_strain(beam, rubber, force).displacement
     solve = lambda stiffness: path.value(force / stiffness)  # noqa: E731
     found = best_stiffness(stiffness, path.values, path.stable, reference, solve)
     if best is None:

@@ -14,7 +14,7 @@ from springtune.mesh.cells import quality, signed_areas
 from springtune.mesh.formats import read_shape, write_mesh
 from springtune.mesh.free import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
-from springtune.problem.boundary import check_case
+from springtune.problem.boundary import check_case, free_motion
 
 from tables import beside, cases, evaluated
 
@@ -97,6 +97,8 @@ def test_the_area_of_a_mesh_comes_to_that_of_the_shape_by_squares():
     disc = st.Shape("disc", 1e-3, st.Hole.circle((0, 0), 1).outline)
     errors = [1 - mesh_shape(disc, math.pi / 2 / n).mesh.area / disc.area for n in (4, 8, 16)]
     assert [math.log2(one / other) for one, other in pairwise(errors)] == pytest.approx([2, 2], abs=0.02)
+    thirds = [st.Segment((math.cos(turn), math.sin(turn)), (0, 0), "rim") for turn in np.arange(3) * math.tau / 3]
+    assert len(mesh_shape(st.Shape("disc", 1e-3, thirds), 1.7).sides["rim"]) == 6
 
 
 def test_sides_are_divided_evenly():
@@ -144,6 +146,7 @@ def test_points_at_the_limit_are_particles_or_refused(distance):
 def test_a_shape_far_from_the_origin_is_meshed_alike():
     far = st.Shape("far", 1e-3, [st.Segment((x, y), group="all") for x, y in UNIT + [1e4, -1e4]])
     assert mesh_shape(far, 0.1).mesh.area == pytest.approx(1, rel=1e-9)
+    assert free_motion(UNIT + [1e6, -1e6], UNIT == 0) == ""
 
 
 def same(grouped, other):
@@ -230,10 +233,8 @@ def test_numbers_of_parts_are_their_names(tmp_path):
 def lines(grouped, points=slice(0), **more):
     """A file's content with lines of its own, and points of the name of the first."""
     cells = [("triangle", grouped.mesh.triangles), *(("line", np.array(edges)) for edges in more.values())]
-    data = {
-        name: [np.full(len(found), i == number + 1, dtype=np.int8) for i, (_, found) in enumerate(cells)]
-        for number, name in enumerate(more)
-    }
+    counts = [len(found) for _, found in cells]
+    data = {name: [np.full(n, i == own, np.int8) for i, n in enumerate(counts)] for own, name in enumerate(more, 1)}
     chosen = np.zeros(len(grouped.mesh.points), dtype=np.int8)
     chosen[points] = 1
     return meshio.Mesh(grouped.mesh.points, cells, {next(iter(more)): chosen} if chosen.any() else {}, data)
@@ -345,9 +346,8 @@ def pull(*supports, at="right", **more):
 def test_each_body_is_to_be_held():
     mesh = two_squares([3, 0])
     outline, _ = outline_of(mesh)
-    sides = {
-        name: outline[(mesh.points[outline, 0] == x).all(axis=1)] for name, x in {"left": 0.0, "right": 4.0}.items()
-    }
+    ends = {"left": 0.0, "right": 4.0}
+    sides = {name: outline[(mesh.points[outline, 0] == x).all(axis=1)] for name, x in ends.items()}
     grouped = st.GroupedMesh(mesh, sides)
     with pytest.raises(ValueError, match=r"one of the 2 bodies that are not joined, at \(3500, 500\) mm, free to move"):
         check_case(grouped, pull(st.Support("left", 0, 0)))

@@ -18,10 +18,8 @@ from tables import cases
 
 PULLED = (st.Quantity("end", "displacement", "right", "x"),)
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not calculix.program(), reason="needs CalculiX (ccx; Debian package calculix-ccx)"),
-]
+NEEDED = "needs CalculiX (ccx; Debian package calculix-ccx)"
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not calculix.program(), reason=NEEDED)]
 
 
 def graded(share, power):

@@ -47,9 +47,8 @@ def swing(one, integrator, step, periods=3, **options):
     """Decay of the loaded mode of a beam that is let go of."""
     motion, seen = one.motion(released=True, **options), []
     steps = round(periods * 2 * np.pi / one.motion().loaded_frequency / step)
-    motion.run(
-        integrator, step, steps, bent(one), sample=1, watch=lambda time, u, v: seen.append((time, share(one, u)))
-    )
+    watch = lambda time, u, v: seen.append((time, share(one, u)))  # noqa: E731
+    motion.run(integrator, step, steps, bent(one), sample=1, watch=watch)
     return fit_swing(*np.array(seen).T)
 
 
@@ -147,13 +146,11 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
     decrement = 0.03 if tendons else DECREMENT
     damping = damped(one, decrement)
     dashpots = damping.beta * st.SpringNet.from_scene(one, errors=False).stiffness
-    model = with_dampers(
-        one, dashpots if tendons else (damping.alpha * one.boundary_problem.masses()).tolist(), tendons
-    )
+    typed = dashpots if tendons else (damping.alpha * one.boundary_problem.masses()).tolist()
+    model = with_dampers(one, typed, tendons)
     free, data, seen = ~one.held, mujoco.MjData(model), []
-    model.opt.timestep = 0.5 * one.motion(**damping.over["springs" if tendons else "mass"]).step_limit(
-        "symplectic-euler"
-    )
+    motion = one.motion(**damping.over["springs" if tendons else "mass"])
+    model.opt.timestep = 0.5 * motion.step_limit("symplectic-euler")
     data.qpos[:] = bent(one)[free]
     moved = np.zeros(free.shape)
     while data.time < 2 * damping.period:

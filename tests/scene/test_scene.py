@@ -39,9 +39,8 @@ class TestSixLines:
         pulled, pressed = scene(load="traction", **soft).solve(), scene(load="compression", **soft).solve()
         assert pulled.error == pytest.approx(-pressed.error) and pulled.error > 0.01
         assert pulled.sign_word == pressed.sign_word == "too soft"
-        assert scene(load="compression", **soft | {"stiffness": "250e6 N/m"}).solve().sign_words == {
-            "displacement": "too stiff"
-        }
+        stiff = scene(load="compression", **soft | {"stiffness": "250e6 N/m"}).solve()
+        assert stiff.sign_words == {"displacement": "too stiff"}
 
     def test_texts_and_numbers_are_one(self):
         assert st.Beam("200 mm", "4 cm", "1 mm") == st.Beam(0.2, 0.04) and st.Beam(0.2, 0.04).name == "200x40"
@@ -180,9 +179,8 @@ class TestShown:
 
     def test_quantities_of_a_shape_have_their_units(self):
         asked = [st.Quantity("end", "displacement", "right", "x"), st.Quantity("corner", "stress", "there", "xx")]
-        pull = st.LoadCase(
-            "pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))], quantities=asked
-        )
+        clamp, end = [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))]
+        pull = st.LoadCase("pull", clamp, end, quantities=asked)
         plate = st.Shape.rectangle("100 mm", "40 mm", points={"there": ("50 mm", "40 mm")}, loads={"pull": pull})
         result = st.Scene(plate, st.mesh_shape(plate, "10 mm"), STEEL, "pull", kinematics="linear").solve()
         shown = {line.split()[0]: line.split()[-1] for line in str(result).splitlines()[1:]}

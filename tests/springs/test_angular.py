@@ -1,5 +1,7 @@
 """Shear and rotational springs beside axial ones, and LAMMPS's volume factor: what they are, and their moduli."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -59,9 +61,8 @@ def test_a_shear_spring_resists_the_strain_across_its_side():
     rng = np.random.default_rng(1)
     stiffness = rng.uniform(0.5, 1.0, (len(mesh.triangles), 3))
     form = slip_form(mesh, stiffness)
-    energy = BiquadraticEnergy(
-        mesh.points, mesh.triangles, form[:, [0, 1, 2], [0, 1, 2]], form[:, [1, 2, 0], [2, 0, 1]]
-    )
+    own, mixed = form[:, [0, 1, 2], [0, 1, 2]], form[:, [1, 2, 0], [2, 0, 1]]
+    energy = BiquadraticEnergy(mesh.points, mesh.triangles, own, mixed)
     here = mesh.points[mesh.triangles]
     sides = np.roll(here, 1, axis=1) - np.roll(here, -1, axis=1)
     across = np.stack([-sides[..., 1], sides[..., 0]], axis=2) / np.linalg.norm(sides, axis=2)[..., None]
@@ -161,8 +162,7 @@ def test_lammps_volume_factor_has_the_moduli_that_it_is_given(nu, edge):
     assert len(once) == 3 * len(points)
     size = 1e-6
     strains = size * np.array([[[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 0.5], [0.5, 0]]])
-    stresses = [
-        lammps_stress(ends[once], vectors[once], len(points), mesh.area, k, factor, strain) / size for strain in strains
-    ]
+    stress = partial(lammps_stress, ends[once], vectors[once], len(points), mesh.area, k, factor)
+    stresses = [stress(strain) / size for strain in strains]
     stiffness = np.array([[one[0, 0], one[1, 1], one[0, 1]] for one in stresses])
     np.testing.assert_allclose(stiffness, st.Material(1.0, nu).plane_stress, atol=2e-5)  # of second order in the strain

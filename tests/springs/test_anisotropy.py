@@ -178,10 +178,8 @@ def test_energy_fit_is_the_least_of_relative_energies():
 
         springs = st.DEFINITIONS["energy-fit"].springs(triangle, material, THICKNESS)
         best = norm(affine_stiffness(triangle, springs) * springs.reference / THICKNESS)
-        unit = [
-            affine_stiffness(triangle, type(springs)(1.0, np.eye(3)[i])) * springs.reference / THICKNESS
-            for i in range(3)
-        ]
+        ones = [type(springs)(1.0, row) for row in np.eye(3)]
+        unit = [affine_stiffness(triangle, one) * springs.reference / THICKNESS for one in ones]
         for _ in range(200):
             other = np.abs(springs.relative + 0.1 * springs.relative.max() * generator.standard_normal(3))
             assert norm(np.einsum("i,ijk->jk", other, unit)) >= best * (1 - 1e-9)

@@ -136,9 +136,8 @@ def test_stress_of_a_lattice_is_the_derivative_of_its_springs_energy(test, acros
 
     def energy(along, other):
         lengths = np.array([along, *2 * [np.sqrt(along**2 + 3 * other**2) / 2]])
-        return sum(
-            a * (lengths**2 / 2 + lengths ** (1 - p) / (p - 1)).sum(0) for a, p in zip((0.3, 0.2, 0.1), (2, 5, 8))
-        )
+        terms = zip((0.3, 0.2, 0.1), (2, 5, 8))
+        return sum(a * (lengths**2 / 2 + lengths ** (1 - p) / (p - 1)).sum(0) for a, p in terms)
 
     other = 1 + across * (q - 1)
     slope = (energy(q + step, other) - energy(q - step, other)) / (2 * step)
@@ -390,11 +389,8 @@ def test_the_field_is_that_of_the_displacement(kind, force):
     beam = st.Beam(0.02, 0.01, 1e-3, "block")
     found = solve_finite_strain(beam, st.Material(1e6, 0.5), force, kind)
     assert (found.x[[0, -1]], found.y[[0, -1]]) == (pytest.approx([0, 0.02]), pytest.approx([0, 0.01]))
-    ends = {0: (beam.length, None), 1: (None, beam.height)}[kind.normal]
-    along = found.positions * (beam.height if kind.normal == 0 else beam.length)
-    points = np.stack(
-        [np.full_like(along, ends[0]), along] if kind.normal == 0 else [along, np.full_like(along, ends[1])], 1
-    )
+    shares = [found.positions, np.ones_like(found.positions)]
+    points = np.stack(shares[::-1] if kind.normal == 0 else shares, 1) * [beam.length, beam.height]
     assert found.at(points)[:, kind.axis] == pytest.approx(found.profile, abs=1e-9)
     for side, axes in kind.held:
         held = np.stack([np.full(7, 0.0), np.linspace(0, beam.height, 7)], 1)
