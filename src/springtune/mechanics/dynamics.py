@@ -279,7 +279,7 @@ class Motion(Moving):
         except SingularError as error:
             return "unstable", f"at rest on a limit point, where the tangent is singular ({error}); use another load"
         if not pivots:
-            why = "" if self.linear else StaticProblem(network, self.load).departure(1.0, displacements)
+            why = "" if self.linear else StaticProblem(network, self.load).departure(displacements)
             return "rest", f"at rest in an equilibrium that a slowly growing load does not reach: {why}" if why else ""
         why = f"{pivots} negative pivot{'s' * (pivots > 1)}: any disturbance ends it"
         remedy = "disturb the body, such as sideways by a thousandth of the load, and run again"

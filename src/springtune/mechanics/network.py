@@ -161,7 +161,7 @@ class Network:
         _, lengths, squares = self._spring_vectors(displacements)
         return self.stiffness * squares / (lengths + self.rest_lengths)
 
-    def rounding(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
+    def rounding(self, displacements: np.ndarray, linear: bool) -> np.ndarray:
         """Return the size of the rounding errors in internal forces [m], (unknowns,): only sums at particles round."""
         total = np.zeros(self.held.shape)
         if linear:

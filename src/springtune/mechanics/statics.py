@@ -314,13 +314,13 @@ class StaticProblem(LoadedNetwork):
                 break
         return self._solve_in_steps(s, found, iterations)
 
-    def departure(self, s: float, displacements: np.ndarray) -> str:
-        """Return why the path from rest does not lead to a stable equilibrium; mostly empty."""
+    def departure(self, displacements: np.ndarray) -> str:
+        """Return why the path from rest does not lead to a stable equilibrium under the load; mostly empty."""
         network = self.network
-        if network.largest_change(displacements) <= UNSNAPPED_CHANGE or self.holds(0.5 * s, 0.5 * displacements):
+        if network.largest_change(displacements) <= UNSNAPPED_CHANGE or self.holds(0.5, 0.5 * displacements):
             return ""
-        found = self.nonlinear(s)
-        status, message, _ = self.judge(s, found)
+        found = self.nonlinear(1.0)
+        status, message, _ = self.judge(1.0, found)
         if status is Status.SOLVED:
             apart = network.largest_change(displacements - found.displacements) > SURPRISING_CHANGE
             return "the path from rest leads to another stable equilibrium" if apart else ""
