@@ -132,5 +132,5 @@ class Campaign:
 
 def forget_keys():
     """Forget keys; of the same code, versions may be others."""
-    for one in (keys.stage_key, keys.code_key, keys.version_of, keys.distribution):
-        one.cache_clear()
+    for name in "stage_key code_key version_of distribution file_digest package_digests".split():
+        getattr(keys, name).cache_clear()

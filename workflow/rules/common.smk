@@ -91,7 +91,7 @@ gc.disable()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 JOBS = plan.jobs(STUDY, RESULTS)
-os.environ[DIGESTS] = json.dumps(keys.digests())
+os.environ[DIGESTS] = json.dumps(keys.package_digests())
 gc.freeze()
 gc.enable()
 plan.STUDIES_READ.append((STUDY, JOBS))

@@ -36,9 +36,9 @@ def test_a_job_takes_the_digests_of_its_run_unless_the_package_changed(monkeypat
     for state, found in ((source_state(), "of the run"), ("of before", keys.file_digest(path))):
         monkeypatch.setenv(STATE, state)
         monkeypatch.setenv(DIGESTS, json.dumps({str(path): "of the run"}))
-        keys.digests.cache_clear()
+        forget_keys()
         assert keys.file_digest(path) == found
-    keys.digests.cache_clear()
+    forget_keys()
 
 
 # -- imports -----------------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def own(tmp_path, monkeypatch):
         name = f"own_{tmp_path.name}_{next(number)}"
         (tmp_path / f"{name}.py").write_text(text)
         importlib.import_module(name)
-        keys.digests.cache_clear()
+        keys.file_digest.cache_clear()
         found = keys.declared_closure(st.DEFINITIONS["own"])
         st.DEFINITIONS.discard("own")
         sys.modules.pop(name)

@@ -12,7 +12,6 @@ from springtune.safe_io import write_json, write_text
 from ..config.model import Study, StudyKind, kinds, outputs
 from ..output import dataset, summary
 from ..runs import job, keys, plan
-from ..runs.source import check_source
 from ..runs.store import DamagedError
 from . import load_study
 
@@ -32,8 +31,7 @@ def run(study: Study, folder: Path, output: Path) -> None:
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Write the dataset of a study, and the record of the job."""
     study = load_study(config)
-    check_source()
-    if not digest.startswith(plan.inputs_digest(study)):
+    if plan.collect_digest(study, plan.stage_jobs(study, Path(folder))) != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     run(study, Path(folder), Path(output))
     write_json(record, {"digest": digest})

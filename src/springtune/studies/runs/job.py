@@ -1,5 +1,6 @@
 """A job of a stage, ``python -m springtune.studies.runs.job TASKS RECORD DIGEST STUDY``."""
 
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -9,7 +10,7 @@ from springtune.problem.shapes import AssumptionWarning
 from springtune.safe_io import write_json
 
 from .attempts import do_in_worker
-from .source import RECORDS, TASKS, check_source, hash_of, read_note
+from .source import PACKAGE, RECORDS, STATE, TASKS, hash_of, read_note, source_state
 from .store import DamagedError
 
 
@@ -26,7 +27,8 @@ def main(tasks: str, record: str, digest: str, study: str) -> None:
         note = _note(tasks, digest)
     if not note:
         raise SystemExit(f"{study} was changed while it ran; call the same command again")
-    check_source()
+    if os.environ.get(STATE, source_state()) != source_state():
+        raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
     try:
         computed = do_in_worker(note["module"], note["content"])
     except DamagedError as error:

@@ -71,20 +71,19 @@ def digest_of(text: str | bytes) -> str:
 
 
 @cache
-def digests() -> dict[str, str]:
-    """Digests of files by path: at first those that the run hands to its jobs, unless a file of the package changed."""
+def package_digests() -> dict[str, str]:
+    """Digests of modules of the package by path: at first those that a run hands to its jobs, unless one changed."""
     known: dict[str, str] = json.loads(os.environ.get(DIGESTS, "{}"))
     return known if known and os.environ.get(STATE) == source_state() else {}
 
 
+@cache
 def file_digest(path: Path) -> str:
     """Hash of a file of code as it computes, or of a template."""
-    return digests().get(str(path)) or digests().setdefault(str(path), _content_digest(path))
-
-
-def _content_digest(path: Path) -> str:
-    content = path.read_bytes()
-    return digest_of(content) if path.suffix == ".py" else hashlib.sha256(content).hexdigest()
+    if path.suffix != ".py":
+        return checksum(path)
+    known = package_digests() if path.is_relative_to(PACKAGE) else {}
+    return known.get(str(path)) or known.setdefault(str(path), digest_of(path.read_bytes()))
 
 
 class Closure(NamedTuple):

@@ -195,7 +195,7 @@ def linked_files(study: Study) -> list[str]:
 def jobs(study: Study, folder: Path) -> dict[str, Job]:
     """All jobs of a study by name."""
     found, read = stage_jobs(study, folder), (str(folder / DATASET),)
-    made = [(COLLECT, _collect_digest(study, found), [DATASET, SUMMARY])]
+    made = [(COLLECT, collect_digest(study, found), [DATASET, SUMMARY])]
     for name, members in output_jobs(study).items():
         files = [file for one in members for file in output_files(one, study)]
         made.append((name, _present_digest(study, members, files), files))
@@ -206,17 +206,12 @@ def jobs(study: Study, folder: Path) -> dict[str, Job]:
     return found
 
 
-def inputs_digest(study: Study) -> str:
-    """Digest of a study's files; the digest of its dataset begins with it."""
-    return hash_of(study.name, inputs(study))
-
-
-def _collect_digest(study: Study, jobs: dict[str, Job]) -> str:
+def collect_digest(study: Study, jobs: dict[str, Job]) -> str:
     """Digest of a study's dataset: of the study's files, the results of its stages and the code."""
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
     results = sorted({result for job in jobs.values() for result in job.results})  # in any bundles
-    return inputs_digest(study) + hash_of(results, code)
+    return hash_of(study.name, inputs(study), results, code)
 
 
 def _present_digest(study: Study, members: Iterable[Output], files: list[str]) -> str:

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -43,19 +42,13 @@ def config_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
 
 STATE = "SPRINGTUNE_SOURCE_STATE"  # environment variable with the `source_state` at the begin of a run, for its jobs
 
-DIGESTS = "SPRINGTUNE_CODE_DIGESTS"  # environment variable with digests of the package's files at that state
+DIGESTS = "SPRINGTUNE_CODE_DIGESTS"  # environment variable with digests of its modules at that state, see `keys`
 
 
 def source_state() -> str:
     """Hash of sizes and times of the package's files."""
     states = [(str(path), path.stat()) for path in sorted(PACKAGE.rglob("*.py"))]
     return hash_of([[name, state.st_size, state.st_mtime_ns] for name, state in states])
-
-
-def check_source() -> None:
-    """Refuse to go on if the package was edited since the run began."""
-    if os.environ.get(STATE, source_state()) != source_state():
-        raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
 
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
