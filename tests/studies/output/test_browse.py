@@ -5,6 +5,7 @@ import json
 import re
 import zlib
 
+import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -17,7 +18,7 @@ from springtune.studies.config.model import kinds
 from springtune.studies.kinds.bodies.collect import ROOT
 from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.samples import PARAMETERS
-from springtune.studies.output.browse import packed, page, views
+from springtune.studies.output.browse import overview, packed, page, views
 
 from synthetic import dataset
 from tables import beside
@@ -36,13 +37,8 @@ def write(folder, *groups):
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """A dataset of two groups, and what was made of it."""
-    folder = tmp_path_factory.mktemp("mine")
-    for name in ("figures/one.png", "figures/one.txt", "tables/index.html", "secret.txt"):
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_text(name)
-    (folder / "figures/link.png").symlink_to(folder / "secret.txt")
-    return write(folder, "fields", "moduli")
+    """A dataset of two groups."""
+    return write(tmp_path_factory.mktemp("mine"), "fields", "moduli")
 
 
 def content(text):
@@ -108,15 +104,12 @@ class TestPage:
 class TestOverview:
     """What the page says first, without a script."""
 
-    AXES = beside(__file__)["overview"]
+    AXES, REFERENCE, PRINTED = (beside(__file__)[name] for name in ("overview", "overview reference", "overview print"))
 
     def said(self, tmp_path, rows):
         """Text of the overview of scenes on one beam."""
         known = {name: labels[0] for name, labels in self.AXES.items() if name != "stiffness_ratio"}
-        body = {"beam": "100x20", "material": "steel", "material_young_modulus": 2e11, "beam_thickness": 1e-3}
-        reference = body | {"load": "traction", "kinematics": "linear"}
-        reference |= {"reference_displacement": 1e-3, "reference_applies": 1}
-        tree = xr.DataTree(ROOT.of_rows(self.AXES, [reference, *(known | row for row in rows)]))
+        tree = xr.DataTree(ROOT.of_rows(self.AXES, [self.REFERENCE, *(known | row for row in rows)]))
         tree.attrs = {"springtune_version": st.__version__, "study": "mine", "title": TITLE}
         tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
         text = page(tmp_path / "dataset.nc")
@@ -148,11 +141,8 @@ class TestOverview:
         assert "Predicted" not in said and "The paper's tables" not in said  # no curve, nothing printed
 
     def test_the_papers_table_stands_beside_ours(self, tmp_path):
-        printed = {"beam": "100x20", "mesh_type": "free", "mesh_size": 1e-3, "material": "steel", "load": "traction"}
-        printed |= {"paper_table": 2, "paper_reference_displacement": 9.5e-4, "paper_displacement": 1.1e-3}
-        printed |= {"paper_deformation_error": 0.1579, "paper_remark": "the error does not fit"}
         rows = [self.solved("paper", 0.05, 1.7e8, 1.7e8, stiffness=1.7e8), self.solved("patch", 1e-3, 1.78e8, 8.9e7)]
-        said = self.said(tmp_path, [printed, *rows])
+        said = self.said(tmp_path, [self.PRINTED, *rows])
         table = said[said.index("Table 2") :]
         assert table.startswith("Table 2: traction, free, steel") and "paper, linear" in table
         assert "100x20 1 0.950 1.10 15.79* 1.000 +5.00 +0.10" in table
@@ -161,6 +151,16 @@ class TestOverview:
     def test_where_nothing_is_solved_it_says_so(self, tmp_path):
         failed = {"status": Status.FAILED, "message": "refuses the mesh", "stiffness_inside": 1.7e8}
         assert self.said(tmp_path, [failed]).startswith("No error of scenes is known: none is solved with a reference")
+
+    def test_legends_have_what_is_drawn_in_the_colours_of_all(self):
+        tree = dataset("sensitivity")
+        tree["deformation_error"][{"load": 0}] = np.nan
+        tree["sensitivity"].deformation_error[{"mesh_size": 0}] = 0.9  # beyond the chart
+        for name in ("best_stiffness", "predicted_stiffness"):
+            tree["sensitivity"][name][{"mesh_size": 0}] = np.nan
+        found = overview(tree)
+        assert found["sources"][0]["errors"].names == {"compression": 1, "pressure": 2}
+        assert found["curves"]["names"] == {"2 mm": 1, "5 mm": 2}
 
 
 class TestCommand:

@@ -374,8 +374,8 @@ def _stiffnesses(values: np.ndarray) -> str:
 
 def _dots(found: Sequence[DefinitionErrors], by: str, labels: Iterable[str]) -> Chart:
     """Errors of each definition: medians by label, of all, and the worst."""
-    x, dots, rows = Axis(ERROR_AXIS, pd.concat([one.cells.percent for one in found]), log=True), [], []
-    names = {label: number % LOOK_COUNT for number, label in enumerate(labels)}
+    x, dots, rows = Axis(ERROR_AXIS, (drawn := pd.concat([one.cells for one in found])).percent, log=True), [], []
+    names = {label: number % LOOK_COUNT for number, label in enumerate(labels) if label in {*drawn[by]}}
     for row, one in enumerate(found):
         y, own = 100 - 100 * (row + 0.5) / len(found), one.cells.percent
         median, worst = f"{100 * one.median:.2g} %", error_text(one.worst.valid_error)
@@ -413,25 +413,25 @@ def _curves(curves: xr.Dataset) -> Content:
     panels = dict(list(found.groupby([*PANEL_LABELS], sort=False)))
     shown = [panel for panel in panels if panel[-1] == "nonlinear" or (*panel[:-1], "nonlinear") not in panels]
     looks = {_size(size): number % LOOK_COUNT for number, size in enumerate(curves.mesh_size.values)}
-    x, charts = Axis("k / (E t)", ratios), []
+    x, charts, drawn = Axis("k / (E t)", ratios), [], set[str]()
     for panel in shown[:MOST_PANELS]:
         lines, dots, members = [], [], panels[panel]
         for _, cell in members[:MOST_LINES].iterrows():
             one = curves.isel(dict(zip(known.dims, cell.place)))
             size, percents = _size(cell.mesh_size), 100 * one.deformation_error.values
             kept = np.abs(percents) <= LARGEST_CURVE_PERCENT
-            points = [(x.at(ratio), CURVE_AXIS.at(error)) for ratio, error in zip(ratios[kept], percents[kept])]
-            lines.append((looks[size], points))
+            drawn |= {size} if kept.any() else set()
+            lines.append((looks[size], [*zip(map(x.at, ratios[kept]), map(CURVE_AXIS.at, percents[kept]))]))
             membrane = float(np.nanmedian(one.stiffness.values / ratios))
-            for name in ("predicted", "best"):
-                stiffness = cell[f"{name}_stiffness"]
+            for name, stiffness in (("predicted", cell.predicted_stiffness), ("best", cell.best_stiffness)):
                 if ratios[0] <= stiffness / membrane <= ratios[-1]:
                     text = f"{cell.beam}, {size}, {name}: {stiffness:.4g} N/m"
+                    drawn |= {size, name}
                     dots.append((f"{name} look{looks[size]}", x.at(stiffness / membrane), CURVE_AXIS.at(0), text))
         more = f"; {len(members) - MOST_LINES} curves more" if len(members) > MOST_LINES else ""
         charts.append(Chart(x, CURVE_AXIS, lines=lines, dots=dots, title=", ".join(panel) + more))
-    seen = {dot[0].split()[0] for chart in charts for dot in chart.dots}
-    return {"charts": charts, "names": looks, "seen": seen, "further": len(shown) - MOST_PANELS}
+    names = {size: look for size, look in looks.items() if size in drawn}
+    return {"charts": charts, "names": names, "seen": drawn, "further": len(shown) - MOST_PANELS}
 
 
 # -- the paper's tables ------------------------------------------------------------------------------------------------
