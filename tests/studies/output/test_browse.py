@@ -31,6 +31,7 @@ def write(folder, *groups):
     tree = dataset(*groups)
     tree["weather"] = xr.DataTree(xr.Dataset({"rain": (("town", "day"), [[1.0, 2.0]])}, {"town": ["here"]}))
     tree.attrs = {"springtune_version": st.__version__, "study": "mine", "title": TITLE, "note": float("nan")}
+    tree.attrs["software"] = json.dumps({"numpy": "2.1", "meshio": "5.3 <b>"})
     tree.to_netcdf(folder / "dataset.nc", engine="h5netcdf")
     return folder / "dataset.nc"
 
@@ -57,6 +58,7 @@ class TestPage:
         text = page(path, ["figures/<img src=x>.png"])
         assert "alert('" not in text and "<img src=x>" not in text
         assert "<title>&lt;script&gt;alert(&#39;&amp;&#39;)&lt;/script&gt;</title>" in text
+        assert '<th scope="row">software</th><td class="small">numpy 2.1, meshio 5.3 &lt;b&gt;</td>' in text
 
     def test_policy_names_every_script_and_forbids_to_load(self, text):
         policy = re.search(r'Policy" content="([^"]*)"', text)[1].replace("&#39;", "'")
