@@ -47,7 +47,7 @@ def folder(tmp_path_factory):
         (folder / name).mkdir(parents=True)
     for name in ("one", "two"):
         (folder / f"config/{name}.yaml").write_text(template_text(Path(name), "beam"))
-    for name in ("own.msh", "file", "text.nc"):
+    for name in ("own.msh", "file", "text.nc", "folder.csv/results"):
         (folder / name).write_text("" if name == "own.msh" else "text")
     quick = (REPOSITORY / "config/quick.yaml").read_text()
     (folder / "bad.yaml").write_text(quick.replace("length:", "lenght:", 1))

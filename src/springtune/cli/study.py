@@ -195,6 +195,9 @@ def run(results: Path | None, arguments: tuple[str, ...]) -> None:
     with warnings.catch_warnings(action="ignore", category=AssumptionWarning):  # Snakemake's reading says it
         study = _load(shown)
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
+    for place in (folder / "results", folder / _results(study)):
+        if place.is_file():
+            raise click.ClickException(f"{place} cannot be written; it is a file: move it, or give another --results")
     if results and folder != Path.cwd():
         click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
