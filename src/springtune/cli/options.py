@@ -153,22 +153,24 @@ def read_body(
     """Read body, material, load and mesh from options; `sized`: a generated mesh needs a size; `further`: a beam's."""
     if given["study"]:
         return _read_shape_options(given, load, sized)
-    needed = {"beam", "material", *further, *(() if not sized or Path(given["mesh"] or "").is_file() else ("size",))}
+    from ..mesh.cells import MESH_TYPES
+
+    mesh_type, size = given["mesh"] or "structured", None
+    made = sized and mesh_type in MESH_TYPES
+    if sized and not made and not Path(mesh_type).is_file():
+        raise ValueError(f"mesh: '{mesh_type}' is neither a mesh type nor a file; known: {', '.join(MESH_TYPES)}")
+    needed = {"beam", "material", *further, *(("size",) if made else ())}
     constants = None if None in (given["young"], given["poisson"]) else "of one's own"
     there = {**given, "material": given["material"] or constants}
     if missing := [text for name, text in MISSING_TEXTS.items() if name in needed and there[name] is None]:
         raise ValueError(*missing)  # each is a line
-    from ..mesh.cells import MESH_TYPES
     from ..scene.single import make_mesh, read_mesh
 
-    material, mesh_type, size = read_material(given), given["mesh"] or "structured", None
-    beam = read_beam(given["beam"], given["thickness"])
-    if sized and mesh_type in MESH_TYPES:
+    material, beam = read_material(given), read_beam(given["beam"], given["thickness"])
+    if made:
         size = positive(given["size"], "length", "size")
         if refusal := MESH_TYPES[mesh_type].refusal(beam.length, beam.height, size, f"beam '{beam.name}'"):
             raise ValueError(f"size: '{given['size']}' {refusal}")
-    elif sized and not Path(mesh_type).is_file():
-        raise ValueError(f"mesh: '{mesh_type}' is neither a mesh type nor a file; known: {', '.join(MESH_TYPES)}")
 
     def make(mesh_type: str, size: float | None) -> "Mesh":
         if size is not None:
