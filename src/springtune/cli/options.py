@@ -112,8 +112,9 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
     if not Path(path).is_file() or Path(path).suffix not in (".yaml", ".yml"):
         raise ValueError(f"study: '{text}': there is no study {path or text}; give one such as {STUDY_EXAMPLE}")
     study = load_study(path)
-    shapes = study.shapes
-    known = list(shapes.shape) if shapes else []
+    if not (shapes := study.shapes):
+        raise ValueError(f"study: '{path}' has no shapes; give --beam, or a study such as {STUDY_EXAMPLE}")
+    known = list(shapes.shape)
     name = known[0] if not name and len(known) == 1 else name
     if name not in known:
         raise ValueError(f"study: '{text}' names none of its shapes; give such as {path}:name; {nearest(name, known)}")
