@@ -143,7 +143,9 @@ def explain_errors(keys: Mapping[str, FieldInfo], content: Any, error: Validatio
         elif kind == "model_type":
             one = refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(keys)}")
         elif kind == "extra_forbidden":
-            one = refuse(f"unknown key {show(place[0])}; {nearest(place[0], keys)}")
+            after_comma = value is None and place[0][:1].isdigit()  # as in {poisson_ratio: 0,3}
+            remedy = "in numbers write a decimal point, no comma" if after_comma else nearest(place[0], keys)
+            one = refuse(f"unknown key {show(place[0])}; {remedy}")
         elif kind == "missing":
             if "extra_forbidden" in kinds or kind in kinds[:number]:
                 continue  # a misspelt key, or the first missing one, is enough
