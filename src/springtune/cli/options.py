@@ -101,7 +101,10 @@ def read_material(given: Mapping[str, Any]) -> "Material":
         known = nearest(str(name), MATERIALS)
         raise ValueError(f"material: unknown material '{name}'; {known}; or give --young and --poisson")
     young, poisson = MATERIALS.get(name, (given["young"], given["poisson"]))
-    return Material(young, number_of(poisson), given["density"], name or "material", given["plane"] or "stress")
+    if math.isnan(ratio := number_of(poisson)) and poisson != "nan":
+        why = "has a comma: write a decimal point" if "," in poisson else "is not a number"
+        raise ValueError(f"poisson: '{poisson}' {why}; give one such as 0.33")
+    return Material(young, ratio, given["density"], name or "material", given["plane"] or "stress")
 
 
 def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":

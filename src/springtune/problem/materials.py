@@ -89,7 +89,8 @@ class Material:
         choose(dict.fromkeys(PLANES), self.plane, "plane")
         put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
-            given = f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}"
+            is_text = ", a text" if isinstance(self.poisson_ratio, str) else ""
+            given = f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}{is_text}"
             raise ValueError(f"{given}: isotropic materials have -1 < nu <= 0.5; give a number in that range")
         if self.plane == "strain" and self.poisson_ratio == 0.5:
             raise ValueError(f"Poisson's ratio of {self.name!r} is {INCOMPRESSIBLE_REASON}")
