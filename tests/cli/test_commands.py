@@ -45,21 +45,21 @@ def folder(tmp_path_factory):
         shutil.copy(REPOSITORY / "config" / name, folder)
     for name in ("config/folder.yaml", "folder.json", "folder.csv"):
         (folder / name).mkdir(parents=True)
-    for name in ("one", "two"):
-        (folder / f"config/{name}.yaml").write_text(template_text(Path(name), "beam"))
+    for name in ("one", "two", "small"):
+        (folder / f"config/{name}.yaml").write_text(template_text(Path("one"), "beam"))
     for name in ("own.msh", "file", "text.nc", "folder.csv/results"):
         (folder / name).write_text("" if name == "own.msh" else "text")
-    quick = (REPOSITORY / "config/quick.yaml").read_text()
-    (folder / "bad.yaml").write_text(quick.replace("length:", "lenght:", 1))
+    (folder / "bad.yaml").write_text((REPOSITORY / "config/quick.yaml").read_text().replace("length:", "lenght:", 1))
     (folder / "c.csv").write_text("force [N],displacement [um]\n0,0\n1,1\n2,2.1\n")
     shape = template_text(Path("x"), "shape")
     (folder / "strain.yaml").write_text(shape.replace("ratio: 0.3}", "ratio: 0.3, plane: strain}"))
-    shapes = STUDIES["cli_shapes"].replace("{supports: {a: fixed}", "{supports: {a: fixed, b: {y: 0}}")
-    (folder / "study.yaml").write_text(shapes)
+    (folder / "study.yaml").write_text(STUDIES["cli_shapes"].replace("s: {a: fixed}", "s: {a: fixed, b: {y: 0}}"))
     hole = st.Hole.circle(("20 mm", "10 mm"), "4 mm")
     write_mesh(folder / "own.vtu", st.mesh_shape(st.Shape.rectangle("40 mm", "20 mm", holes=[hole]), "4 mm"))
     write_mesh(folder / "braced.vtu", st.make_mesh(st.Beam("100 mm", "20 mm"), "braced", "5 mm"))
-    written(small(), folder / "results/small/dataset.nc")
+    tree = small()
+    tree.attrs |= {"config": template_text(Path("one"), "beam"), "software": "{}"}
+    written(tree, folder / "results/small/dataset.nc")
     written(small(beam=("200x40", "200x40")), folder / "twice.nc")
     xr.Dataset({"a": 1}).to_netcdf(folder / "plain.nc")
     return folder

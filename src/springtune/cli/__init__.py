@@ -43,8 +43,9 @@ def file_errors(place: str, remedy: str = "give a file that can be written") -> 
     try:
         yield
     except OSError as error:
-        why = os.strerror(error.errno) if error.errno else error
-        raise click.ClickException(f"{place}: {why}; {remedy}") from None
+        if not error.errno:  # of a damaged file that is read
+            raise
+        raise click.ClickException(f"{shown(place)}: {os.strerror(error.errno)}; {remedy}") from None
 
 
 COMMANDS = {

@@ -12,7 +12,7 @@ from ..registry import how_to_install
 from ..safe_io import aligned, clipped, shown
 from ..studies.output.text import bytes_text, cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER, workflow_folder
-from . import PATH, WrongCall, command
+from . import PATH, WrongCall, command, file_errors
 
 if TYPE_CHECKING:
     from ..studies.output.comparison import Change, Comparison, GroupChanges
@@ -57,7 +57,7 @@ def export(path: Path, target: Path, group: str, force: bool) -> None:
     from ..studies.output import reading
     from ..studies.output.export import export as write
 
-    with reading.open(path) as tree, reading.guard(path):
+    with reading.open(path) as tree, reading.guard(path), file_errors(f"--to: {target}"):
         click.echo(write(tree, target, group, force))
 
 
@@ -100,7 +100,8 @@ def archive(folder: Path, out: Path | None, force: bool) -> None:
         raise click.UsageError(f"--out: {target} is no name of a zip file; give one such as {folder.name}.zip")
     if target.exists() and not force:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
-    names = pack(load_study(config), folder, target)
+    with file_errors(f"--out: {target}"):
+        names = pack(load_study(config), folder, target)
     click.echo(f"{target}: {len(names)} files, {bytes_text(target.stat().st_size)}")
 
 
