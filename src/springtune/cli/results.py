@@ -68,9 +68,9 @@ def browse(path: Path) -> None:
 
     PATH is results/<study>, or a file in it.
     """
-    page = (path if path.is_dir() else path.parent) / "index.html"
+    page = (path if path.is_dir() else path.parent) / "index.html" if path.exists() else path
     if not page.is_file():
-        raise click.ClickException(f"{page}: there is no such page; run the study, which writes it")
+        raise click.ClickException(f"{shown(page)}: there is no such page; run the study, which writes it")
     click.echo(str(page))
     click.launch(str(page))
 
