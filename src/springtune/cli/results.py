@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..registry import how_to_install
-from ..safe_io import aligned, clipped, shown
+from ..safe_io import aligned, check_folder, clipped, shown
 from ..studies.output.text import bytes_text, cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER, workflow_folder
 from . import PATH, WrongCall, command, file_errors
@@ -98,6 +98,8 @@ def archive(folder: Path, out: Path | None, force: bool) -> None:
     target = out or folder.with_name(f"{folder.name}.crate.zip")
     if target.is_dir() or target.suffix != ".zip":
         raise click.UsageError(f"--out: {target} is no name of a zip file; give one such as {folder.name}.zip")
+    if out:
+        check_folder(out)
     if target.exists() and not force:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
     with file_errors(f"--out: {target}"):
