@@ -168,8 +168,6 @@ def read_body(
     there = {**given, "material": given["material"] or constants}
     if missing := [text for name, text in MISSING_TEXTS.items() if name in needed and there[name] is None]:
         raise ValueError(*missing)  # each is a line
-    from ..scene.single import make_mesh, read_mesh
-
     material, beam = read_material(given), read_beam(given["beam"], given["thickness"])
     if made:
         size = positive(given["size"], "length", "size")
@@ -177,6 +175,8 @@ def read_body(
             raise ValueError(f"size: '{given['size']}' {refusal}")
 
     def make(mesh_type: str, size: float | None) -> "Mesh":
+        from ..scene.single import make_mesh, read_mesh  # here, since it takes half a second
+
         if size is not None:
             return make_mesh(beam, mesh_type, size)
         unit = given["unit"] if given["unit"][:1].isdigit() else f"1 {given['unit']}"
@@ -239,10 +239,10 @@ def target_option(name: str, meaning: str, required: bool = False) -> Callable[[
     """Decorator that adds an option for a file of springs; a wrong ending and a missing folder are refused."""
 
     def check(_: click.Context, __: click.Parameter, target: Path | None) -> Path | None:
-        from ..handover import formats
-
         try:
             if target is not None:
+                from ..handover import formats  # here: it takes a second
+
                 formats.check_target(target)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None

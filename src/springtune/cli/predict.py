@@ -99,15 +99,14 @@ def predict(
     With --engine, find the factor on the stiffness that an engine needs at a setting, the errors under other loads, and
     the settings that converge. Stiff materials can take many minutes.
     """
-    from ..prediction.choices import USUAL_LOADS
-    from .recommendation import written_text
-
     names = None if load is None else [name.strip() for name in load.split(",") if name.strip()]
     show_progress()
     if engine["engine"] is not None:
         text, make = _answer_for_engine(sheet, engine, names or [], springs_alone)
     else:
         body = options.read_body(sheet, load, sized=error is None)
+        from ..prediction.choices import USUAL_LOADS  # here, so that a wrong option does not wait for it
+
         loads = USUAL_LOADS if names is None else names
         under: dict[str, Any] = {"loads": loads} if body.is_beam else {"load": body.load}
         if error is None:
@@ -116,6 +115,8 @@ def predict(
             text, make = _answer_for_error(body, under, springs_alone, error, sheet["mesh"])
     click.echo(text)
     if target is not None:
+        from .recommendation import written_text
+
         net = make()
         with file_errors(f"--write: {target}"):
             click.echo(f"\n{written_text(net, net.write(target))}")
