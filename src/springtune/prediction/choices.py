@@ -22,7 +22,7 @@ from ..safe_io import Tabled, TabledList
 from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem, unit_reference
 from ..scene.mesh_cache import MeshCache, check_type
 from ..scene.motion import stable_steps
-from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
+from ..springs.base import DEFINITIONS, EQUAL_STIFFNESS, Definition, DefinitionError, Springs
 
 USUAL_LOADS = ("traction", "bending", "shear")  # loads that are predicted where none are named
 
@@ -30,8 +30,6 @@ SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
 """Limits of a beam's sides [m] and aspect ratio: beyond them the unit is likely wrong, or bending has no reference."""
 
 MOST_CHOICES = 4  # choices that are kept of all definitions, and of those of springs alone
-
-EQUAL_STIFFNESS = 1e-5  # relative difference below which stiffnesses count as equal: five digits are shown
 
 EQUAL_FORCES = 1e-11  # relative difference below which stiffness matrices count as equal, but for rounding
 

@@ -12,6 +12,8 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import out_of_range
 from ..registry import Declaration, Registry
 
+EQUAL_STIFFNESS = 1e-5  # relative difference below which stiffnesses count as equal: five digits are shown
+
 
 class DefinitionError(ValueError):
     """A definition does not support a mesh or material; the message gives the reason and the remedy.

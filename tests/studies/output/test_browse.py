@@ -111,7 +111,8 @@ class TestOverview:
     def said(self, tmp_path, rows):
         """Text of the overview of scenes on one beam."""
         known = {name: labels[0] for name, labels in self.AXES.items() if name != "stiffness_ratio"}
-        tree = xr.DataTree(ROOT.of_rows(self.AXES, [self.REFERENCE, *(known | row for row in rows)]))
+        references = [self.REFERENCE | {"load": load} for load in self.AXES["load"]]
+        tree = xr.DataTree(ROOT.of_rows(self.AXES, [*references, *(known | row for row in rows)]))
         tree.attrs = {"springtune_version": st.__version__, "study": "mine", "title": TITLE}
         tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
         text = page(tmp_path / "dataset.nc")
@@ -128,17 +129,20 @@ class TestOverview:
     def test_what_to_type_is_of_the_finest_mesh_and_the_best_springs(self, tmp_path):
         said = self.said(tmp_path, [
             self.solved("paper", -0.2, 1.7e8, 1.7e8, stiffness=1.7e8), self.solved("patch", 1e-3, 1.78e8, 8.9e7),
-            # A coarser mesh, and energies without a spring, have smaller errors.
+            self.solved("patch", 2e-3, 1.78e8, 8.9e7, load="shear"),
+            # A coarser mesh, energies without a spring, one load alone, and all loads but one have smaller errors.
             self.solved("patch", 0.0, 1.6e8, 8e7, mesh_size=5e-3),
-            self.solved("neo-hooke", 1e-5, 0.0, 0.0),
-            self.solved("delingette", 1e-4, 1.8e8, 9e7, stiffness=1.8e8, further_energies=1),
+            self.solved("neo-hooke", 1e-5, 0.0, 0.0), self.solved("lattice", 0.0, 1.7e8, 8e7),
+            self.solved("area", 0.0, 1.7e8, 8e7), self.solved("area", 0.5, 1.7e8, 8e7, load="shear"),
+            self.solved("delingette", 1e-4, 1.8e8, 9e7, stiffness=1.8e8, further_energies=1, stiffness_alike=0),
         ])  # fmt: skip
         answer = (
             "For 100x20, free 1 mm, steel: patch 1.78e8 N/m inside (0.89 E t), 8.9e7 N/m on the outline, "
-            "error +0.10 %; best uniform stiffness 1.7e8 N/m (paper), error −20 %; with energies besides springs del"
+            "worst error +0.20 %; best uniform stiffness 1.7e8 N/m (paper), error −20 %; with energies besides springs "
+            "delingette, each spring its own: springtune springs writes them, error +0.01 %. "
         )
         assert said.startswith(answer)
-        assert "patch, linear 0.05 %; +0.10 %" in said and "paper, linear 20 %; −20 %" in said
+        assert "patch, linear 0.1 %; +0.20 %" in said and "paper, linear 20 %; −20 %" in said
         assert "Medians of each mesh size; a line joins them. Run time: deriving" in said
         assert "Predicted" not in said and "The paper's tables" not in said  # no curve, nothing printed
 

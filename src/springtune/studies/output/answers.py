@@ -42,7 +42,7 @@ def definition_errors(cells: "pd.DataFrame") -> list[DefinitionErrors]:
 
 
 class Answer(NamedTuple):
-    """Stiffnesses [N/m] to type for a definition on a mesh: the different ones of its springs, sorted."""
+    """Stiffnesses [N/m] to type for a definition on a mesh: those of its scenes, sorted; none if springs differ."""
 
     labels: tuple[str, ...]  # of the mesh type and material
     mesh_size: float
@@ -52,16 +52,19 @@ class Answer(NamedTuple):
     inside: np.ndarray
     outline: np.ndarray
     ratio: float  # median inside over E t
-    errors: np.ndarray  # of the scenes
+    errors: "pd.Series"  # of the scenes, by load
 
     @property
-    def median_error(self) -> float:
-        """Median size of the errors."""
-        return float(np.median(np.abs(self.errors)))
+    def worst_error(self) -> float:
+        """Error of the largest size."""
+        return float(self.errors.iloc[self.errors.abs().argmax()])
 
 
 def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "material")) -> Iterator[tuple[Answer, ...]]:
-    """Return the best springs alone, uniform stiffness and springs with energies, on each finest mesh."""
+    """Return the best springs alone, uniform stiffness and springs with energies, on each finest mesh.
+
+    The best has errors under most loads, and the smallest worst error.
+    """
     if "stiffness_inside" not in cells:
         return
     membrane = cells.get("material_young_modulus", np.nan) * cells.get("beam_thickness", np.nan)
@@ -71,16 +74,18 @@ def what_to_type(cells: "pd.DataFrame", by: Sequence[str] = ("mesh_type", "mater
     for labels, here in cells.groupby([*by], sort=False):
         size, answers = here.mesh_size[here.known].min(), []
         for name, own in here[here.mesh_size == size].groupby("definition"):
-            inside, outline = (np.unique(own[f"stiffness_{place}"].dropna()) for place in ("inside", "outline"))
+            alike = own[own.stiffness_alike != 0] if "stiffness_alike" in own else own
+            inside, outline = (np.unique(alike[f"stiffness_{place}"].dropna()) for place in ("inside", "outline"))
             energies = "further_energies" in own and bool(own.further_energies.max() > 0)
             uniform = not energies and "stiffness" in own and bool(own.stiffness.notna().any())
-            kind, ratio = (uniform, energies), own.ratio.median()
-            if len(errors := own.valid_error[own.known].to_numpy()):
-                answers.append(Answer(labels, size, name, *kind, inside, outline, ratio, errors))
-        order = (False, False), (True, False), (False, True)
-        kinds = ([one for one in answers if (one.uniform, one.energies) == kind] for kind in order)
+            if len(errors := own[own.known].set_index("load").valid_error):
+                ratio = alike.ratio.median()
+                answers.append(Answer(labels, size, name, uniform, energies, inside, outline, ratio, errors))
+        answers.sort(key=lambda one: (-one.errors.index.nunique(), abs(one.worst_error)))
+        # Springs alone, uniform ones, with energies.
+        kinds = ([one for one in answers if 2 * one.energies + one.uniform == kind] for kind in range(3))
         if answers:
-            yield tuple(min(kind, key=lambda one: one.median_error) for kind in kinds if kind)
+            yield tuple(kind[0] for kind in kinds if kind)
 
 
 def count_statuses(flags: np.ndarray) -> dict[str, int]:

@@ -49,8 +49,7 @@ def text(groups: Mapping[str, "xr.Dataset"], title: str, most: int | None = DEFI
             data = against_own_laws(groups[name], groups.get("/finite_strain") if name == "/" else None)
             cells = requested_cells(data, names[0])
             lines += _errors(cells, data, names, most)
-            if name == "/":  # of shapes quantities have errors
-                lines += _stiffness_to_type(cells)
+            lines += _stiffness_to_type(cells) if name == "/" else []  # of shapes quantities have errors
     for name, data in groups.items():
         if COMPARED_VARIABLES <= set(data):
             lines += _lines_on_references(data, "scenes" if name == "/" else name.strip("/"))
@@ -132,14 +131,14 @@ def _stiffness_to_type(cells: "pd.DataFrame") -> Iterator[str]:
     answers = [one for found in what_to_type(cells) for one in found]
     rows = [
         [one.definition + " +" * one.energies, *one.labels, f"{1e3 * one.mesh_size:.4g} mm",
-         range_text(one.inside), range_text(one.outline), f"{one.ratio:.3g}" if np.isfinite(one.ratio) else "",
-         f"{100 * one.median_error:.2g} %"]
+         range_text(one.inside) or "each its own", range_text(one.outline) or "each its own",
+         f"{one.ratio:.3g}" if np.isfinite(one.ratio) else "", f"{100 * one.worst_error:+.2g} %"]
         for one in answers
     ]  # fmt: skip
     if rows:
         plus = "; best with energies besides springs (+)" if any(one.energies for one in answers) else ""
         yield from ("", f"what to type [N/m], on the finest mesh: best springs alone; best single stiffness{plus}")
-        heads = ["definition", "mesh type", "material", "size", "inside", "outline", "inside / E t", "median error"]
+        heads = ["definition", "mesh type", "material", "size", "inside", "outline", "inside / E t", "worst error"]
         yield from aligned([heads, *rows], 2, range(3, 8)).splitlines()
 
 

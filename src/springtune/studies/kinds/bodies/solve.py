@@ -17,7 +17,7 @@ from springtune.problem.shapes import Beam
 from springtune.reference.answers import field_error, interpolate
 from springtune.scene.boundary_problem import BeamProblem, ShapeProblem
 from springtune.scene.mesh_cache import MeshCache, definition_of, naming_errors
-from springtune.springs.base import DEFINITIONS, DefinitionError
+from springtune.springs.base import DEFINITIONS, EQUAL_STIFFNESS, DefinitionError
 
 from ...runs.source import hash_of
 from . import stored
@@ -98,14 +98,17 @@ def _solve_problem(problem, springs, seconds, task):
 
 
 def _typical_stiffness(mesh, springs):
-    """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most."""
-    sizes = springs.relative if springs.linear_springs is None else springs.linear_springs
+    """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most; alike."""
+    alike = springs.linear_springs is None  # else they belong to an energy
+    sizes = springs.relative if alike else springs.linear_springs
     found = {"least": sizes.min(), "most": sizes.max()}
     for part, chosen in (("inside", ~mesh.on_outline), ("outline", mesh.on_outline)):
         there = np.sort(sizes[chosen])  # `np.median` would take a twentieth of a small scene's time
         count = len(there)
         found[part] = 0.5 * (there[(count - 1) // 2] + there[count // 2]) if count else np.nan
-    return {f"stiffness_{part}": float(springs.reference * value) for part, value in found.items()}
+        alike = alike and (not count or there[-1] - there[0] <= EQUAL_STIFFNESS * abs(found[part]))
+    stiffnesses = {f"stiffness_{part}": float(springs.reference * value) for part, value in found.items()}
+    return stiffnesses | {"stiffness_alike": int(alike)}
 
 
 def solve_beam(beam, cache, field, task):

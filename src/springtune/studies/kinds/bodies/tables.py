@@ -81,6 +81,7 @@ NETWORK_COLUMNS = {
     "printed_displacement_mm": ("paper_displacement", 1e3),
     "printed_error_percent": ("paper_deformation_error", 100),
     **{f"{name}_N_per_m": (name, 1) for name in ("stiffness", "stiffness_inside", "stiffness_outline")},
+    "stiffness_alike": ("stiffness_alike", 1),
     "network_mm": ("displacement", 1e3),
     "reference_mm": ("reference_displacement", 1e3),
     "error_percent": ("deformation_error", 100),
@@ -155,14 +156,16 @@ def _page_cells(rows, definitions, swept, finite):
 
 
 def _stiffnesses(rows):
-    """Text with the stiffness to type: of uniform definitions one, of others medians inside and on the outline."""
+    """Text with the stiffness to type: of uniform definitions one, of others those inside and on the outline."""
     parts = []
     for name, own in pd.DataFrame(rows).groupby("definition", sort=False):
         words = {"stiffness_inside_N_per_m": " inside", "stiffness_outline_N_per_m": " on the outline"}
         words = {"stiffness_N_per_m": ""} if own["stiffness_N_per_m"].notna().any() else words
-        found = {word: own[column].dropna() for column, word in words.items() if own[column].notna().any()}
+        alike = own[own["stiffness_alike"] != 0]
+        found = {word: alike[column].dropna() for column, word in words.items() if alike[column].notna().any()}
         texts = [f"{range_text(values)} N/m{word}" for word, values in found.items()]
         parts += [f"{name}: k = {', '.join(texts)}"] if texts else []
+        parts += [f"{name}: each spring its own k"] if (own["stiffness_alike"] == 0).any() else []
     return "; ".join(parts)
 
 
