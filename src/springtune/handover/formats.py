@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from ..mesh.formats import MOST_MESSAGE_CHARACTERS
 from ..safe_io import check_folder, json_line, replacing, shown, write_text
@@ -174,6 +173,8 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
 
 def _csv_text(arrays: Mapping[str, np.ndarray], heads: Heads) -> str:
     """Table of some arrays."""
+    import pandas as pd  # here: it takes half a second
+
     columns = []
     for name, titles in heads.items():
         if name in arrays:
