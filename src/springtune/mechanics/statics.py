@@ -264,14 +264,14 @@ class StaticProblem(LoadedNetwork):
         share = f"{100 * found.unstable_share:.3g} %"
         if found.limit_share < 1 and not found.unstable_share < found.limit_share:
             at = f"{100 * found.limit_share:.3g} % of the load"
-            message = f"limit point: the path from rest turns back and becomes unstable at {at}"
-            if found.snapped:
-                message += "; after a snap the body reaches a stable equilibrium that carries the load"
-            return Status.UNSTABLE, message, np.nan
+            at += "; after a snap the body reaches a stable equilibrium that carries the load" * found.snapped
+            return Status.UNSTABLE, f"limit point: the path from rest turns back and becomes unstable at {at}", np.nan
         if found.unstable_share < 1 and not found.converged:
             return Status.UNSTABLE, f"buckled: the path from rest is unstable at {share} of the load", np.nan
         if not found.converged:
-            return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
+            too_large = found.load_share < 1 and "ill-conditioned" not in found.reason
+            remedy = "; take a smaller force or linear kinematics" if too_large else ""
+            return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}{remedy}", np.nan
         assert found.factor is not None  # of what converged
         try:
             pivots, flutters = self.stability(s, found.displacements, found.factor)
