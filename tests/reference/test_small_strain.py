@@ -402,6 +402,7 @@ def test_a_bent_beam_is_beyond_the_linear_reference_from_one_percent_on(load, ap
     assert (text == "") == applies == (abs(3 * answers.elastica(load) / load - 1) <= 0.01)
     if load == 1.0:
         assert "turns by 0.5 rad" in text and "9.4 %" in text  # 9.5 at the very end
+    assert answers.beyond_linear(1e9 * load, 2e7).endswith("does not apply: its strain is 2e+09 %")  # no word of turns
 
 
 def test_the_paper_s_traction_applies():

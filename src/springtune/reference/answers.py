@@ -45,6 +45,8 @@ MOST_ROTATION_EFFECT = 0.01
 
 MOST_STRAIN = 0.15  # largest strain for a small-strain reference; the paper's beams stretch by 5 %, its block by 11 %
 
+FAR_STRAIN = 1.0  # strain from which it alone is told: the small-strain rotation beside it says nothing
+
 JUDGED_AREA_SHARE = 0.95
 """Share of a body in which rotations and strains are at most those that it is judged by: corners are singular."""
 
@@ -107,7 +109,7 @@ def beyond_linear(rotation: float, strain: float) -> str:
     """Return why a small-strain reference of this rotation [rad] and strain [1] does not fit nonlinear kinematics."""
     reasons = []
     # The first term of the series bounds the effect: most beams do without the elastica, and without importing it.
-    may_matter = 4 / 35 * (2 * rotation) ** 2 > MOST_ROTATION_EFFECT
+    may_matter = abs(strain) < FAR_STRAIN and 4 / 35 * (2 * rotation) ** 2 > MOST_ROTATION_EFFECT
     if may_matter and -(effect := rotation_effect(rotation)) > MOST_ROTATION_EFFECT:
         reasons.append(f"it turns by {abs(rotation):.2g} rad, and a cantilever that turns so far deflects by "
                        f"{-100 * effect:.2g} % less than in small strain")  # fmt: skip
