@@ -1,5 +1,6 @@
 """Definitions and stiffnesses to use on a mesh, with their errors, solved in linear kinematics."""
 
+import logging
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, nan
@@ -23,6 +24,8 @@ from ..scene.boundary_problem import BeamProblem, BoundaryProblem, ShapeProblem,
 from ..scene.mesh_cache import MeshCache, check_type
 from ..scene.motion import stable_steps
 from ..springs.base import DEFINITIONS, EQUAL_STIFFNESS, Definition, DefinitionError, Springs
+
+logger = logging.getLogger(__name__)
 
 USUAL_LOADS = ("traction", "bending", "shear")  # loads that are predicted where none are named
 
@@ -389,6 +392,7 @@ class Trial:
     def springs(self, name: str) -> Springs | None:
         """Springs of a definition, derived once; None with a reason in `failures`."""
         if name not in self.same and name not in self.failures:
+            logger.info("solving %s: %s particles", name, len(self.mesh.points))
             try:
                 springs = self.problems[0].springs(DEFINITIONS[name], None)[0]
             except DefinitionError as error:
@@ -467,6 +471,7 @@ class Trial:
         young = poisson = nan
         if self._test is not None:
             target = cast(Material, self.materials[0]).in_plane.young_modulus * self.thickness
+            logger.info("measuring the moduli of %s", name)
             try:
                 modulus, poisson = self._test.axial(springs)
                 young = modulus * springs.reference / target - 1
