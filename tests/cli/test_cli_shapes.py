@@ -84,9 +84,8 @@ class TestSprings:
         study = st.load_study("study.yaml")
         plate = study.shape("plate")
         grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "2 mm"})
-        linear = st.Scene(
-            plate, grouped, study.material("steel"), "pull", definition="lattice", kinematics="linear"
-        ).solve()
+        how = {"definition": "lattice", "kinematics": "linear"}
+        linear = st.Scene(plate, grouped, study.material("steel"), "pull", **how).solve()
         target = tmp_path / "net.json"
         result = run("springs", *PLATE, "--definition", "lattice", "--scale", "2", "--out", target)
         assert result.exit_code == 0, result.output

@@ -124,10 +124,9 @@ class TestNew:
     def test_nothing_is_overwritten(self, checkout):
         run("new", "my-study")
         Path("config/my-study.yaml").write_text("mine")
+        said = "config/my-study.yaml: is there already; give another name, or change that file"
         for given in ("my-study", "config/my-study.yaml"):
-            refused(
-                run("new", given), 1, "config/my-study.yaml: is there already; give another name, or change that file"
-            )
+            refused(run("new", given), 1, said)
         assert Path("config/my-study.yaml").read_text() == "mine"
         Path("config/gone.yaml").symlink_to("nowhere")
         refused(run("new", "gone"), 1, "is there already")

@@ -116,9 +116,8 @@ class TestExport:
         """Those of samples are coordinates besides the dimensions, not variables."""
         error = xr.DataArray([[0.1, 0.2], [0.3, np.nan]], dims=("sample", "load"), coords={"load": ["a", "b"]})
         height = xr.DataArray([0.02, 0.03], dims="sample", attrs={"units": "m"})
-        group = xr.Dataset(
-            {"error": error, "count": ("sample", [1, 2])}, {"height": height, "role": ("load", ["x", "y"])}
-        )
+        variables = {"error": error, "count": ("sample", [1, 2])}
+        group = xr.Dataset(variables, {"height": height, "role": ("load", ["x", "y"])})
         tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "0"}), "/samples": group})
         tree.to_netcdf(tmp_path / "all.nc")
 
