@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 import yaml
 from hypothesis import given
 from hypothesis import strategies as some
@@ -9,6 +10,7 @@ from hypothesis import strategies as some
 import springtune as st
 from springtune.problem.quantities import MOST_SCENES_VARIABLE, SWEPT
 from springtune.studies.config.fields import spaced
+from springtune.studies.kinds.bodies.tables import tables as tables_of
 
 from campaigns import Campaign
 from tables import STUDIES, beside, refused_files
@@ -192,8 +194,7 @@ def test_a_cell_of_a_sweep_is_that_of_a_study_of_its_own(swept):
 
 def test_a_stiffer_network_gives_way_as_one_under_less_force(swept):
     """Stiffness enters as F/k alone: 1.25 times it under 125 N is as 100 N, but for the rounding of a quotient."""
-    tree, _, _ = swept
-    root = tree.to_dataset()
+    root = swept[0].to_dataset()
     stiff, soft = (root.displacement.sel(stiffness_scale=scale, force=100 * scale) for scale in (1.25, 1.0))
     assert (np.abs(stiff / soft - 1) < 1e-9).all()
     assert (root.stiffness.sel(definition="lattice").isnull()).all()
@@ -202,18 +203,18 @@ def test_a_stiffer_network_gives_way_as_one_under_less_force(swept):
 def test_figures_show_the_last_values_and_say_which(swept):
     tree, _, _ = swept
     assert st.plot_sensitivity(tree)
-    (panel,) = st.plot_size(tree)
-    title = panel.get_title(loc="left").replace("\n", " ").replace("\u00a0", " ")
+    title = st.plot_size(tree)[0].get_title(loc="left").replace("\n", " ").replace("\u00a0", " ")
     assert title == "long (200 x 30 mm), 125 N, thickness 3 mm, E = 2 GPa, nu = 0.5"
     (panel,) = st.plot_sweep(tree, parameter="force")
     lines = {line.get_label(): line for line in panel.lines if line.get_label() in ("lattice", "delingette")}
     assert [*lines["lattice"].get_xdata()] == [100.0, 125.0]
-    wanted = tree.deformation_error.sel(
-        definition="lattice", thickness=3e-3, young_modulus=2e9, poisson_ratio=0.5, stiffness_scale=1.0
-    )
+    last = {"thickness": 3e-3, "young_modulus": 2e9, "poisson_ratio": 0.5, "stiffness_scale": 1.0}
+    wanted = tree.deformation_error.sel(definition="lattice").sel(last)
     assert lines["lattice"].get_ydata() == pytest.approx(100 * wanted.values.ravel())
-    doubted = tree.to_dataset()
-    doubted = doubted.assign(reference_applies=0 * doubted.reference_applies)
+    doubted = tree.to_dataset().assign(reference_message=("force", ["it turns", "it turns more"]))
+    doubted["reference_applies"] = 0 * doubted.reference_applies
+    notes = [f"r long, nonlinear, force [N] {said}" for said in ("100: it turns", "125: it turns more")]
+    assert tables_of(xr.DataTree(doubted))[0]["remarks"] == notes
     (panel,) = st.plot_sweep(doubted, parameter="force")
     assert any("hollow: beyond small strain" in text.get_text().replace("\n", " ") for text in panel.texts)
     with pytest.raises(ValueError, match="parameter: 'height' is not swept; the study sweeps force, thickness"):
@@ -223,8 +224,7 @@ def test_figures_show_the_last_values_and_say_which(swept):
 def of_grids(folder, name, grids, **keys):
     """Path of a study of one beam, 60x20, of these grids on structured meshes, linear, without curves."""
     told = beside(__file__)["of grids"]
-    content = {"title": name} | told["study"]
-    content["grids"] = {str(number): told["grid"] | grid for number, grid in enumerate(grids)}
+    content = told["study"] | {"title": name, "grids": {str(n): told["grid"] | grid for n, grid in enumerate(grids)}}
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump(content | keys, sort_keys=False))
     return path
@@ -272,11 +272,9 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
         place = {"beam": "60x20", "mesh_type": "structured", "load": "bending", "mesh_size": 10e-3}
         network = st.field(tree, **place, force=2e3, thickness=2e-3).squeeze()
         assert (float(network.force), float(network.thickness)) == (2e3, 2e-3)
-        beam = st.Beam("60 mm", "20 mm", "2 mm")
+        beam, steel = st.Beam("60 mm", "20 mm", "2 mm"), st.Material("210 GPa", 0.3)
         mesh = st.make_mesh(beam, "structured", "10 mm")
-        steel = st.Material("210 GPa", 0.3)
-        scene = st.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear")
-        result = scene.solve()
+        result = st.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear").solve()
         small = 1e-9 * np.abs(result.displacements).max()
         assert np.allclose(network.displacement_y.values, result.displacements[:, 1], rtol=1e-9, atol=small)
         assert np.allclose(network.spring_force.values, result.spring_forces, rtol=1e-5, atol=1e-3)
@@ -285,5 +283,4 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
         (panel,) = st.plot_deformed(tree, load="bending", kinematics="linear")
         assert "2\u00a0kN, thickness 2\u00a0mm, mesh 10 mm" in panel.get_title(loc="left").replace("\n", " ")
         assert not [text for text in panel.texts if "no network" in text.get_text()]
-        pieces = sorted((here / "results/said/paraview").glob("*.vtu"))
-        assert len(pieces) == 2
+        assert len([*(here / "results/said/paraview").glob("*.vtu")]) == 2

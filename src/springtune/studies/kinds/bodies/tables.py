@@ -108,8 +108,7 @@ def _scene_table(data, selection):
         row |= {"status": STATUS[row["status"]], "reference_applies": words[int(row["reference_applies"])]}
     title = f"{selection['load']}, {selection['mesh_type']} mesh, {selection['material']}"
     found = {"stem": stem(selection, number), "title": f"Table {number}: {title}" if number else title}
-    further = [column for column in _swept_columns(swept) if column != "force_N"]
-    shown = _page_cells(rows, labels_of(present, "definition"), further, "finite_strain" in data.attrs)
+    shown = _page_cells(rows, labels_of(present, "definition"), _swept_columns(swept), "finite_strain" in data.attrs)
     return found | {"number": number, "rows": rows, "note": _stiffnesses(rows)} | shown
 
 
@@ -121,12 +120,13 @@ def _page_cells(rows, definitions, swept, finite):
     data = pd.DataFrame(rows)
     length = decimals(data[["network_mm", "reference_mm"]].to_numpy().ravel())
     percent, printed = error_decimals(data["error_percent"]), data["printed_displacement_mm"].notna().any()
+    alike = data.groupby(["beam", "kinematics", "reference_message"])[[*swept]].nunique().to_dict("index")
     lines, marks, remarks = {}, set(), {}
     for row in rows[:MOST_ROWS]:
         beam, size, status = row["beam"], f"{row['mesh_size_mm']:g}", row["status"]
         force = f"{row['force_N']:g}".replace("-", "−")
         line = {("", "Beam"): beam, ("", "Mesh [mm]"): size, ("", "Force [N]"): force}
-        line |= {("", head(name)): f"{row[name]:.6g}" for name in swept}
+        line |= {("", head(name)): f"{row[name]:.6g}" for name in swept if name != "force_N"}
         line = lines.setdefault((*line.values(), row["kinematics"]), line)
         if printed:
             remark = "*" if row["remark"] else ""
@@ -143,7 +143,9 @@ def _page_cells(rows, definitions, swept, finite):
         line[row["definition"], "error [%]"] = number(row["error_percent"], percent, sign=True) if answered else ""
         marks |= {*own, *(STATUS_MARKS[status] if answered else ""), *("*" if row["remark"] else "")}
         reasons = {f"* {beam}, {size} mm": row["remark"], text: "" if answered else row["message"]}
-        reasons[f"r {beam}, {row['kinematics']}"] = row["reference_message"] if "r" in own else ""
+        label, why = (beam, row["kinematics"]), row["reference_message"]
+        place = [f"{head(name)} {row[name]:.6g}" for name in swept if alike[*label, why][name] == 1]
+        reasons[f"r {', '.join([*label, *place])}"] = why if "r" in own else ""
         remarks |= {f"{what}: {why}": None for what, why in reasons.items() if why}
     medians = data["error_percent"].abs().groupby(data["definition"]).median()
     best = sorted(definitions, key=lambda name: (np.isnan(medians[name]), medians[name]))
