@@ -10,13 +10,14 @@ from springtune.safe_io import replacing, shown
 
 from .config.model import Study
 from .output import reading
+from .runs import plan
 from .runs.keys import input_files
 from .runs.source import checksum
 
 CHECKSUMS_FILE, VERSIONS_FILE, README = "SHA256SUMS", "versions.json", "README.md"
 
-PRODUCTS = ("dataset.nc", "index.html", "summary.txt", "figures/*", "tables/*")
-"""Files of `results/<study>` that are packed; what the stages stored is not, since the study makes it again."""
+PRODUCTS = (plan.DATASET, plan.PAGE, plan.SUMMARY)
+"""Files of `results/<study>` that are packed, beside figures and tables; what the stages stored is made again."""
 
 README_TEXT = """# {title}
 
@@ -42,7 +43,8 @@ def pack(study: Study, folder: Path, target: Path) -> list[str]:
                 f"{folder}: the dataset is of another text of {study.path}; run the study, then archive it"
             )
         versions = json.dumps(json.loads(tree.attrs["software"]), indent=1)
-    files = {path.relative_to(folder).as_posix(): path for name in PRODUCTS for path in sorted(folder.glob(name))}
+    made = (name for name in plan.presented_files(study) if name.startswith(("figures/", "tables/")))
+    files = {name: path for name in (*PRODUCTS, *sorted(made)) if (path := folder / name).is_file()}
     files |= _inputs(study)
     texts = {
         README: README_TEXT.format(title=about["title"], version=about["springtune_version"], study=study.path.name),

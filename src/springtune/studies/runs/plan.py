@@ -186,10 +186,14 @@ def output_files(output: Output, study: Study) -> list[str]:
     return figures + [f"{output.into}/{name}" for name in names]
 
 
+def presented_files(study: Study) -> list[str]:
+    """Files of all requested outputs, relative to the study's folder; those of removed values are not among them."""
+    return [path for members in output_jobs(study).values() for one in members for path in output_files(one, study)]
+
+
 def linked_files(study: Study) -> list[str]:
     """Files that the page to browse links to, relative to the study's folder."""
-    made = (path for members in output_jobs(study).values() for one in members for path in output_files(one, study))
-    return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
+    return [path for path in presented_files(study) if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
 
 def jobs(study: Study, folder: Path) -> dict[str, Job]:
