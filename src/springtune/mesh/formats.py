@@ -2,7 +2,7 @@
 
 import io
 import re
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -140,9 +140,10 @@ def _file_content(path: str | Path) -> Content:
         most = f"at most {MOST_FILE_BYTES // 1_000_000} MB are read"
         raise MeshError(f"{path}: {size / 1e6:.0f} MB, and {most}; write a coarser mesh, or binary VTU")
     memory, seconds = READ_BYTES + READ_BYTES_PER_BYTE * size, READ_SECONDS + READ_SECONDS_PER_BYTE * size
+    aside = io.StringIO()
     try:
         # meshio prints what it leaves out, and exits where it reads nothing.
-        with redirect_stderr(io.StringIO()), np.errstate(all="ignore"), bounded(memory, seconds):
+        with redirect_stderr(aside), redirect_stdout(aside), np.errstate(all="ignore"), bounded(memory, seconds):
             return _read(path, ending)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
@@ -178,6 +179,8 @@ def _read_vtu(raw: bytes) -> Content:
         raise MeshError(abaqus.OTHER_FILES_REASON)
     if (pieces := len(re.findall(rb"<Piece\b", head))) > 1:
         raise MeshError(f"has {pieces} pieces, and one is read; join them, in ParaView by the filter Clean to Grid")
+    if re.search(rb"NumberOfCells\s*=\s*.0\b", head):  # which meshio does not read
+        raise MeshError("has no cells; write the mesh with triangles or quadrilaterals")
     with TemporaryDirectory() as folder:
         file = Path(folder) / "piece.vtu"
         # Version 2 tells copies and polyhedra in another way, cells alike; meshio knows version 1.
