@@ -43,8 +43,8 @@ def pack(study: Study, folder: Path, target: Path) -> list[str]:
                 f"{folder}: the dataset is of another text of {study.path}; run the study, then archive it"
             )
         versions = json.dumps(json.loads(tree.attrs["software"]), indent=1)
-    made = (name for name in plan.presented_files(study) if name.startswith(("figures/", "tables/")))
-    files = {name: path for name in (*PRODUCTS, *sorted(made)) if (path := folder / name).is_file()}
+    packed = (name for name in plan.presented_files(study) if name.startswith(("figures/", "tables/")))
+    files = {name: path for name in (*PRODUCTS, *sorted(packed)) if (path := folder / name).is_file()}
     files |= _inputs(study)
     texts = {
         README: README_TEXT.format(title=about["title"], version=about["springtune_version"], study=study.path.name),
