@@ -173,7 +173,8 @@ class TestCommand:
     def test_the_page_of_a_study_is_opened_and_its_path_printed(self, tmp_path, monkeypatch):
         opened = []
         monkeypatch.setattr("click.launch", opened.append)
-        (tmp_path / "index.html").write_text("page")
+        for name in ("index.html", "dataset.nc"):
+            (tmp_path / name).touch()
         for given in (tmp_path, tmp_path / "dataset.nc"):
             result = CliRunner().invoke(main, ["browse", str(given)])
             assert (result.exit_code, result.stdout) == (0, f"{tmp_path}/index.html\n")
