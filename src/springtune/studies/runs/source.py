@@ -42,7 +42,7 @@ def config_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
 
 STATE = "SPRINGTUNE_SOURCE_STATE"  # environment variable with the `source_state` at the begin of a run, for its jobs
 
-DIGESTS = "SPRINGTUNE_CODE_DIGESTS"  # environment variable with digests of its modules at that state, see `keys`
+DIGESTS = "SPRINGTUNE_CODE_DIGESTS"  # environment variable with digests of the package's modules at that state
 
 
 def source_state() -> str:

@@ -98,7 +98,7 @@ def _solve_problem(problem, springs, seconds, task):
 
 
 def _typical_stiffness(mesh, springs):
-    """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, the least and the most; alike."""
+    """Stiffness of springs at rest [N/m]: medians inside and on the outline, or NaN, least, most; whether alike."""
     alike = springs.linear_springs is None  # else they belong to an energy
     sizes = springs.relative if alike else springs.linear_springs
     found = {"least": sizes.min(), "most": sizes.max()}
